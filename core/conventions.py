@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The conventions of docs/architecture.md as code: everything that fixes an order, a sign or a unit.
+
+World space is Blender's: right-handed, Z up, metres. Light is linear RGB radiance. Spherical harmonics are real and
+orthonormal, without the Condon-Shortley phase, ordered l(l+1)+m.
+
+Cube faces, seen from the probe. A face point is ``forward + s·right + t·up`` with s, t in −1..1; texel column grows with s,
+row with t, texel centres at half-integers::
+
+    face  forward  right  up             +t
+     0      +X      −Y    +Z              ^
+     1      −X      +Y    +Z              |  N rows
+     2      +Y      +X    +Z              |
+     3      −Y      −X    +Z              +-----> +s, N columns
+     4      +Z      +X    −Y      (the image that a camera at the probe sees when it
+     5      −Z      +X    +Y       looks along forward with up as its up)
+"""
+
+import numpy as np
+
+FORMAT_VERSION = (1, 0)  # of the probe file: readers refuse a newer major
+
+FACE_FORWARD = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
+FACE_RIGHT = np.array([[0, -1, 0], [0, 1, 0], [1, 0, 0], [-1, 0, 0], [1, 0, 0], [1, 0, 0]], float)
+FACE_UP = np.array([[0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1], [0, -1, 0], [0, 1, 0]], float)
+
+MAX_BANDS = 4
+
+# Probe states, as stored in the file.
+CULLED, ACTIVE, INVALID = 0, 1, 2
+
+# Edge of the octahedral map of depth statistics that every probe carries for its visibility weights.
+DEPTH_EDGE = 8
+
+# Cosine lobe, per band: irradiance = Σ A_l L_lm Y_lm(n). Ramamoorthi and Hanrahan, "An Efficient Representation for
+# Irradiance Environment Maps", SIGGRAPH 2001, eq. 8. The fourth band's factor is exactly zero.
+COSINE_LOBE = np.array([np.pi, 2 * np.pi / 3, np.pi / 4, 0.0])
+
+# Rec. 709 luminance of linear RGB.
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+def band_of(index: int) -> int:
+    """Band l of coefficient ``index`` = l(l+1)+m."""
+    return int(np.floor(np.sqrt(index)))
+
+
+def coefficient_names(bands: int) -> list[str]:
+    """Channel names in coefficient order: L00, L1m1, L10, L11, L2m2 …"""
+    names = []
+    for l in range(bands):
+        for m in range(-l, l + 1):
+            names.append(f"L{l}{'m' if m < 0 else ''}{abs(m)}")
+    return names

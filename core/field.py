@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The baked field: what a bake produces, a probe file holds and a lookup reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .conventions import ACTIVE, DEPTH_EDGE
+from .grid import Grid
+
+
+@dataclass
+class Field:
+    """Radiance SH of all probes of one grid, with what a lookup needs. P = ``grid.count``, flat node order.
+
+    ``offset`` is the displacement of the capture position from the node in metres. ``depth`` holds mean and mean square of the
+    distance to the nearest surface in an octahedral map (row-major, DEPTH_EDGE² texels) in metres and metres².
+    ``metadata`` is the JSON part of the probe file.
+    """
+
+    grid: Grid
+    coefficients: np.ndarray  # (P, bands², 3) float32 radiance
+    state: np.ndarray  # (P,) uint8: CULLED, ACTIVE, INVALID
+    validity: np.ndarray  # (P,) float32: share of the sphere that is not back faces, 0..1
+    offset: np.ndarray  # (P, 3) float32 metres
+    depth: np.ndarray  # (P, DEPTH_EDGE², 2) float32
+    metadata: dict = field(default_factory=dict)
+
+    @property
+    def bands(self) -> int:
+        return int(round(np.sqrt(self.coefficients.shape[1])))
+
+    @classmethod
+    def empty(cls, grid: Grid, bands: int) -> Field:
+        """A field of zeros, all active, with nothing in sight."""
+        count = grid.count
+        return cls(
+            grid,
+            np.zeros((count, bands * bands, 3), np.float32),
+            np.full(count, ACTIVE, np.uint8),
+            np.ones(count, np.float32),
+            np.zeros((count, 3), np.float32),
+            np.zeros((count, DEPTH_EDGE * DEPTH_EDGE, 2), np.float32),
+        )
