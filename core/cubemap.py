@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cubemap texels and the octahedral map: directions, exact solid angles, and their inverses.
+
+GLSL twin: gpu_shaders/cubemap_lib.glsl. The face layout is drawn in core/conventions.py.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .conventions import FACE_FORWARD, FACE_RIGHT, FACE_UP
+
+
+def _corner_integral(s: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Solid angle of the face rectangle (0, 0)–(s, t) at distance 1."""
+    return np.arctan2(s * t, np.sqrt(s * s + t * t + 1.0))
+
+
+def texel_directions(face: int) -> np.ndarray:
+    """(6, face, face, 3) unit directions through the texel centres, indexed [face, row, column]."""
+    centre = (np.arange(face) + 0.5) * 2.0 / face - 1.0
+    t, s = np.meshgrid(centre, centre, indexing="ij")
+    axes = (a[:, None, None, :] for a in (FACE_FORWARD, FACE_RIGHT, FACE_UP))
+    forward, right, up = axes
+    directions = forward + s[None, :, :, None] * right + t[None, :, :, None] * up
+    return directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+
+
+def texel_solid_angles(face: int) -> np.ndarray:
+    """(face, face) exact solid angles of one face's texels, steradian; six faces sum to 4π to rounding.
+
+    The difference of corner integrals over the texel's rectangle, as in Filament's ``CubemapUtils::solidAngle`` after
+    Manne Öhrström's note; exact because ∂²/∂s∂t atan2(st, √(s²+t²+1)) is the projected area element.
+    """
+    edge = np.arange(face + 1) * 2.0 / face - 1.0
+    integral = _corner_integral(edge[None, :], edge[:, None])
+    return np.diff(np.diff(integral, axis=0), axis=1)
+
+
+def direction_to_texel(directions: np.ndarray, face: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(face index, row, column) of the texel that each of ``directions`` (…, 3) falls into."""
+    directions = np.asarray(directions, float)
+    magnitude = np.abs(directions)
+    axis = np.argmax(magnitude, axis=-1)
+    negative = np.take_along_axis(directions, axis[..., None], -1)[..., 0] < 0
+    index = 2 * axis + negative
+    depth = np.take_along_axis(magnitude, axis[..., None], -1)[..., 0]
+    s = np.einsum("...i,...i->...", directions, FACE_RIGHT[index]) / depth
+    t = np.einsum("...i,...i->...", directions, FACE_UP[index]) / depth
+
+    def texel(value):
+        return np.clip(((value * 0.5 + 0.5) * face).astype(int), 0, face - 1)
+
+    return index, texel(t), texel(s)
+
+
+def octahedral_decode(uv: np.ndarray) -> np.ndarray:
+    """Unit directions of octahedral coordinates ``uv`` (…, 2) in −1..1.
+
+    Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors", JCGT 2014, listing 2.
+    """
+    u, v = np.moveaxis(np.asarray(uv, float), -1, 0)
+    z = 1.0 - np.abs(u) - np.abs(v)
+    fold = np.maximum(-z, 0.0)
+    x = u - np.copysign(fold, u)
+    y = v - np.copysign(fold, v)
+    directions = np.stack([x, y, z], axis=-1)
+    return directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+
+
+def octahedral_encode(directions: np.ndarray) -> np.ndarray:
+    """Inverse of ``octahedral_decode``: (…, 3) unit directions to (…, 2) in −1..1."""
+    directions = np.asarray(directions, float)
+    x, y, z = np.moveaxis(directions / np.abs(directions).sum(axis=-1, keepdims=True), -1, 0)
+    folded_x = np.copysign(1.0 - np.abs(y), x)
+    folded_y = np.copysign(1.0 - np.abs(x), y)
+    below = z < 0
+    return np.stack([np.where(below, folded_x, x), np.where(below, folded_y, y)], axis=-1)
