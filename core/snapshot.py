@@ -90,8 +90,8 @@ class Light:
 class World:
     """Background radiance: one colour, or an equirectangular map.
 
-    ``map`` is (height, width, 3) float32; row 0 is straight down (−Z), column u = 0 looks along −X and u grows
-    towards +Y… in Blender's equirectangular convention: u = atan2(y, −x)/2π + ½, v = atan2(z, √(x²+y²))/π + ½.
+    ``map`` is (height, width, 3) float32 in the layout of ``core.panorama``, which is Blender's: row 0 is straight down
+    (−Z), u = ½ − atan2(y, x)/2π, v = atan2(z, √(x²+y²))/π + ½, so u = 0 looks along −X, ¼ along +Y, ½ along +X.
     """
 
     color: tuple[float, float, float] = (0.0, 0.0, 0.0)
