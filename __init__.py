@@ -3,14 +3,16 @@
 
 
 def register():
-    from . import operators, panels
+    from . import cli, operators, panels
 
     operators.register()
     panels.register()
+    cli.register()
 
 
 def unregister():
-    from . import operators, panels
+    from . import cli, operators, panels
 
+    cli.unregister()
     panels.unregister()
     operators.unregister()

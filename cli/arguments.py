@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reading the command line: a parser that fails with one line, and the value types of the options."""
+
+from __future__ import annotations
+
+import argparse
+import math
+
+from ..core.errors import InputError
+
+# Options whose values may start with a minus sign, which argparse would take for another option.
+SIGNED_OPTIONS = ("--min", "--max", "--spacing", "--seed", "--frame", "--tolerance", "--bounces", "--gather", "--samples",
+                  "--bands", "--face", "--memory", "--resolution", "--points", "--spp")
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse whose errors are one plain line, raised as InputError."""
+
+    def __init__(self, *args, **kwargs):
+        super().__init__(*args, allow_abbrev=False, **kwargs)
+
+    def error(self, message):
+        raise InputError(f"{' '.join(message.split())} ('{self.prog} --help' lists the options)")
+
+
+def join_signed_values(argv: list[str]) -> list[str]:
+    """``argv`` with ``--min -1,-2,0`` written as ``--min=-1,-2,0``, which argparse reads as meant."""
+    joined = []
+    words = iter(argv)
+    for word in words:
+        if word == "--":
+            return [*joined, word, *words]
+        if word in SIGNED_OPTIONS:
+            value = next(words, None)
+            if value is None:
+                joined.append(word)
+            elif len(value) > 1 and value[0] == "-" and (value[1].isdigit() or value[1] in ".-in" and _is_number(value)):
+                joined.append(f"{word}={value}")
+            else:
+                joined += [word, value]
+        else:
+            joined.append(word)
+    return joined
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text.split(",")[0])
+    except ValueError:
+        return False
+    return True
+
+
+def point(text: str) -> tuple[float, float, float]:
+    """``X,Y,Z`` in metres, finite."""
+    parts = text.split(",")
+    try:
+        values = tuple(float(part) for part in parts)
+    except ValueError:
+        values = ()
+    if len(values) != 3 or not all(map(math.isfinite, values)):
+        raise argparse.ArgumentTypeError(f"'{text}' is not three finite numbers X,Y,Z")
+    return values
+
+
+def counts(text: str) -> tuple[int, int, int]:
+    """``NX,NY,NZ``; the range is the grid's business."""
+    try:
+        values = tuple(int(part) for part in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) != 3:
+        raise argparse.ArgumentTypeError(f"'{text}' is not three whole numbers NX,NY,NZ")
+    return values
+
+
+def length(text: str) -> float:
+    """A positive, finite length in metres."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a length in metres greater than 0")
+    return value
+
+
+def bounces(text: str) -> int | None:
+    """A number of bounces; None for ``auto``."""
+    if text == "auto":
+        return None
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is neither a whole number nor auto") from None

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``gridlight bake``: from a .blend to probe files, pictures and a report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..core.errors import InputError
+from ..core.settings import CAPTURES, BakeSettings
+from . import arguments
+
+HELP = "bakes the probe volumes of a .blend, or one fitted to its scene"
+NEEDS_BLENDER = NEEDS_GPU = True
+
+
+def add_arguments(parser, in_blender: bool) -> None:
+    if in_blender:
+        parser.add_argument("file", metavar="FILE.blend", nargs="?", help="instead of the file that Blender has open")
+    else:
+        parser.add_argument("file", metavar="FILE.blend")
+    parser.add_argument("-o", "--output", metavar="DIR", required=True, help="folder for the results, made where missing")
+    volume = parser.add_argument_group("volume (default: those of the file, or one fitted to the scene)")
+    volume.add_argument("--min", metavar="X,Y,Z", type=arguments.point, help="corner of an axis-aligned volume, metres")
+    volume.add_argument("--max", metavar="X,Y,Z", type=arguments.point, help="the opposite corner")
+    volume.add_argument("--resolution", metavar="NX,NY,NZ", type=arguments.counts, help="probes per axis, 1 to 256")
+    volume.add_argument("--spacing", metavar="M", type=arguments.length, help="or the distance between probes, metres")
+    add_settings(parser)
+    parser.add_argument("--frame", metavar="N", type=int, help="frame to bake (default: the file's current one)")
+    parser.add_argument("--quiet", action="store_true", help="no progress; warnings stay")
+
+
+def add_settings(parser) -> None:
+    """The options that become a BakeSettings, with its defaults."""
+    standard = BakeSettings()
+    group = parser.add_argument_group("bake")
+    group.add_argument("--bands", metavar="1..4", type=int, default=standard.bands,
+                       help="spherical-harmonic bands; a fourth adds nothing to diffuse light (default %(default)s)")
+    group.add_argument("--face", metavar="N", type=int, default=standard.face, help="texels per cube face edge (default %(default)s)")
+    group.add_argument("--bounces", metavar="N|auto", type=arguments.bounces, default=standard.bounces,
+                       help="light iterations; auto: until the tolerance is met (default auto)")
+    group.add_argument("--tolerance", metavar="T", type=float, default=standard.tolerance,
+                       help="relative energy still missing when iterations stop (default %(default)s)")
+    group.add_argument("--gather", metavar="N", type=int, default=standard.gather,
+                       help="bounces really traced before the field is read (default %(default)s)")
+    group.add_argument("--samples", metavar="N", type=int, default=standard.samples,
+                       help="shadow samples per texel and soft light (default %(default)s)")
+    group.add_argument("--capture", choices=CAPTURES, default=standard.capture, help="how probes see (default %(default)s)")
+    group.add_argument("--seed", metavar="N", type=int, default=standard.seed, help="of the sampling (default %(default)s)")
+    group.add_argument("--keep-all", action="store_true", help="bake every probe, cull none")
+    group.add_argument("--memory", metavar="MIB", type=int, default=standard.memory_mib,
+                       help="limit for GPU textures of the capture (default %(default)s)")
+
+
+def settings_from(args) -> BakeSettings:
+    """Raises InputError for values out of range."""
+    return BakeSettings(bands=args.bands, face=args.face, bounces=args.bounces, tolerance=args.tolerance, gather=args.gather,
+                        samples=args.samples, capture=args.capture, seed=args.seed, keep_all=args.keep_all,
+                        memory_mib=args.memory)
+
+
+def check(args) -> None:
+    """What can be refused before Blender starts."""
+    settings_from(args)
+    if (args.min is None) != (args.max is None):
+        raise InputError("--min and --max belong together; give both or neither")
+    if args.resolution and args.spacing:
+        raise InputError("--resolution and --spacing exclude each other; give one")
+    if args.min and not (args.resolution or args.spacing):
+        raise InputError("--min and --max need --resolution NX,NY,NZ or --spacing M")
+    if args.file is not None and not Path(args.file).exists():
+        raise InputError(f"{args.file}: no such file")

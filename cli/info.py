@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``gridlight info``: what a probe file holds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..core.conventions import ACTIVE, CULLED, INVALID, LUMINANCE
+from ..formats import probe_file
+
+HELP = "what a probe file holds"
+NEEDS_BLENDER = NEEDS_GPU = False
+
+
+def add_arguments(parser, in_blender: bool) -> None:
+    parser.add_argument("probes", metavar="PROBES.exr")
+
+
+def run(args, reporter, should_stop):
+    field = probe_file.read(args.probes)
+    summary = summarise(field)
+    print(_text(args.probes, summary))
+    return summary, 0
+
+
+def summarise(field) -> dict:
+    """What ``info`` says about ``field``, as plain values. Lengths in metres, radiance in scene units."""
+    grid = field.grid
+    active = field.state == ACTIVE
+    mean = field.coefficients[active, 0] @ LUMINANCE * 0.28209479177387814  # L00·Y00 is the mean radiance
+    corners = np.array([[x, y, z, 1.0] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) @ grid.matrix.T
+    summary = {
+        **field.metadata,
+        "probes": {"total": grid.count, "active": int(active.sum()), "culled": int((field.state == CULLED).sum()),
+                   "invalid": int((field.state == INVALID).sum())},
+        "bounds": {"min": corners[:, :3].min(axis=0).tolist(), "max": corners[:, :3].max(axis=0).tolist()},
+        "spacing": grid.cell_size().tolist(),
+        "mean_radiance": None if not len(mean) else
+        {"min": float(mean.min()), "mean": float(mean.mean()), "max": float(mean.max())},
+    }
+    summary.setdefault("warnings", [])
+    return summary
+
+
+def _text(path: str, summary: dict) -> str:
+    def triple(values):
+        return " × ".join(f"{value:.4g}" for value in values)
+
+    probes, bounds, light = summary["probes"], summary["bounds"], summary["mean_radiance"]
+    major, minor = summary["format_version"]
+    lines = [
+        f"{path}: probe file {major}.{minor}, volume '{summary['volume']['name']}'",
+        f"  probes     {triple(summary['resolution'])} = {probes['total']}: {probes['active']} active, {probes['culled']} culled, "
+        f"{probes['invalid']} invalid",
+        f"  box        {' '.join(f'{v:.4g}' for v in bounds['min'])}  to  {' '.join(f'{v:.4g}' for v in bounds['max'])} m, "
+        f"spacing {triple(summary['spacing'])} m",
+        f"  bands      {summary['bands']}",
+    ]
+    if light:
+        lines.append(f"  radiance   mean per active probe {light['min']:.4g} to {light['max']:.4g}, average {light['mean']:.4g}")
+    if "device" in summary:
+        lines.append(f"  device     {summary['device']}")
+    if isinstance(summary.get("settings"), dict):
+        lines.append("  settings   " + ", ".join(f"{key} {value}" for key, value in summary["settings"].items()))
+    if "scene_hash" in summary:
+        lines.append(f"  scene      {summary['scene_hash']}")
+    lines += [f"  warning    {' '.join(str(text).split())}" for text in summary["warnings"]]
+    return "\n".join(lines)

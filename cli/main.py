@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line: reads the arguments, runs one command, turns its outcome into an exit status and one JSON line.
+
+A command is a module of this folder with
+
+* ``HELP``: one line; ``NEEDS_BLENDER``, ``NEEDS_GPU``: what it runs on;
+* ``add_arguments(parser, in_blender)``;
+* ``run(args, reporter, should_stop) -> (summary, exit status)``: does the work; the summary is printed as JSON.
+
+and optionally ``check(args)``, quick checks that need no Blender, made before one is started.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import json
+import os
+import signal
+import sys
+import traceback
+
+from ..core.errors import Cancelled, GridlightError, InputError
+from ..formats import staging
+from . import worker
+from .arguments import Parser, join_signed_values
+from .progress import Reporter
+
+COMMANDS = ("demo", "bake", "eval", "verify", "bench", "export", "info", "diff")
+
+
+class Stop:
+    """Whether the user asked to stop. Called between steps of the work; also answers an interrupt during a wait."""
+
+    def __init__(self):
+        self.asked = False
+
+    def __call__(self) -> bool:
+        return self.asked
+
+    def ask(self, _number=None, _frame=None):
+        self.asked = True
+
+
+def main(argv: list[str], in_blender: bool = False) -> int:
+    """Runs one command line and returns its exit status. ``in_blender``: called by ``blender --command gridlight``."""
+    child = worker.is_child()
+    if child:
+        worker.prepare_child()
+    status = _guarded(argv, in_blender, child)
+    if child:
+        worker.leave(status)
+    return status
+
+
+def _guarded(argv: list[str], in_blender: bool, child: bool) -> int:
+    try:
+        return _run(argv, in_blender, child)
+    except Cancelled:
+        _say("cancelled")
+        return Cancelled.exit_status
+    except KeyboardInterrupt:
+        _say("cancelled")
+        return Cancelled.exit_status
+    except GridlightError as error:
+        _say(str(error))
+        return error.exit_status
+    except BrokenPipeError:
+        # Whoever read our output has enough. Python would complain again when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return 0
+    except MemoryError:
+        _say("not enough memory for this; use a lower --resolution, --face or --memory")
+        return InputError.exit_status
+    except Exception:  # a defect of ours: the one case in which a traceback helps the user, who can send it to us
+        traceback.print_exc()
+        _say("this is a defect of Gridlight; please report it with the lines above")
+        return 1
+
+
+def _run(argv: list[str], in_blender: bool, child: bool) -> int:
+    modules = _commands(argv)
+    parser = _parser(modules, in_blender)
+    args = parser.parse_args(join_signed_values(list(argv)))
+    if args.command is None:
+        raise InputError(f"name a command: {', '.join(modules)} ('gridlight --help' explains them)")
+    module = modules[args.command]
+    if not child and hasattr(module, "check"):
+        module.check(args)
+    if module.NEEDS_BLENDER and not (in_blender or child):
+        status, process = worker.run_in_child(argv, _say, module.NEEDS_GPU, args.verbose)
+        if status not in (0, 4) and getattr(args, "output", None):
+            staging.remove_leftovers(args.output, process)
+        return status
+    stop = Stop()
+    previous = signal.signal(signal.SIGINT, stop.ask) if module.NEEDS_BLENDER else None
+    if child:
+        signal.signal(signal.SIGTERM, stop.ask)
+    reporter = Reporter(quiet=getattr(args, "quiet", False))
+    try:
+        summary, status = module.run(args, reporter, stop)
+    finally:
+        reporter.finish()
+        if previous is not None:
+            signal.signal(signal.SIGINT, previous)
+    print(json.dumps(summary, allow_nan=False), flush=True)
+    return status
+
+
+def _commands(argv: list[str]) -> dict:
+    """The command modules that this installation has, by name; only the one that ``argv`` starts with where it does."""
+    available = [name for name in COMMANDS if importlib.util.find_spec(f".{name}", __package__)]
+    chosen = [name for name in available if argv[:1] == [name]]
+    return {name: importlib.import_module(f".{name}", __package__) for name in chosen or available}
+
+
+def _parser(modules: dict, in_blender: bool) -> Parser:
+    parser = Parser(prog="gridlight", description="Bakes grids of light probes on the GPU.")
+    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", parser_class=Parser)
+    for name, module in modules.items():
+        sub = subparsers.add_parser(name, help=module.HELP, description=module.HELP)
+        module.add_arguments(sub, in_blender)
+        sub.add_argument("--verbose", action="store_true", help="show what Blender itself prints")
+    return parser
+
+
+def _say(text: str) -> None:
+    print(f"gridlight: {text}", file=sys.stderr, flush=True)

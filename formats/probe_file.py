@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The probe file: one OpenEXR file per volume, exact in both directions, readable by any EXR reader.
+
+32-bit float, ZIP, one part of scanlines, width nx, height ny·nz, row = j + ny·k. Channels, B bands::
+
+    L00.R L00.G L00.B … L33.B   radiance coefficients by band and order, B² of them
+    state                       0 culled, 1 active, 2 invalid
+    validity                    0..1
+    offset.X .Y .Z              capture position minus node, metres
+    depth.mean.00 … .63         mean distance per octahedral texel, metres
+    depth.meansq.00 … .63       mean squared distance, metres²
+
+The text attribute ``gridlight`` is one JSON object: what the channels cannot say (see ``describe``), and ``digest``, the SHA-256
+of that object without the digest and of all channel bytes, so a damaged file is noticed wherever the damage is. A file
+without ``digest`` is accepted: other programs may write one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import sys
+
+import numpy as np
+
+from ..core.conventions import ACTIVE, CULLED, DEPTH_EDGE, FORMAT_VERSION, INVALID, MAX_BANDS, coefficient_names
+from ..core.errors import InputError
+from ..core.field import Field
+from ..core.grid import Grid
+
+ATTRIBUTE = "gridlight"
+MAX_BYTES = 1 << 30  # of pixels; a reader that checks the header first never allocates more
+DEPTH_TEXELS = DEPTH_EDGE * DEPTH_EDGE
+CONVENTIONS = {
+    "space": "right-handed, Z up, metres",
+    "order": "x fastest, then y, then z; row = j + ny*k",
+    "coefficients": "radiance, scene-linear Rec. 709 RGB",
+    "basis": "real orthonormal spherical harmonics without the Condon-Shortley phase, index l(l+1)+m",
+    "irradiance": "sum of A_l L_lm Y_lm(n), A = pi, 2pi/3, pi/4, 0",
+    "matrix": "rows; box frame -1..1 to world",
+    "depth": f"octahedral map of {DEPTH_EDGE}x{DEPTH_EDGE} texels, row-major",
+}
+
+
+def channel_names(bands: int) -> list[str]:
+    """All channels in the order in which ``_planes`` holds them."""
+    names = [f"{name}.{color}" for name in coefficient_names(bands) for color in "RGB"]
+    names += ["state", "validity", "offset.X", "offset.Y", "offset.Z"]
+    for statistic in ("mean", "meansq"):
+        names += [f"depth.{statistic}.{texel:02d}" for texel in range(DEPTH_TEXELS)]
+    return names
+
+
+def check_size(grid: Grid, bands: int) -> None:
+    """Raises InputError where a field of ``grid`` is too large for one file; cheap, made before the long work."""
+    size = grid.count * len(channel_names(bands)) * 4
+    if size > MAX_BYTES:
+        raise InputError(f"{grid.name}: {grid.count} probes need {size >> 20} MiB in one probe file, the limit is "
+                         f"{MAX_BYTES >> 20} MiB; use a lower resolution, fewer bands or several volumes")
+
+
+def describe(field: Field) -> dict:
+    """The JSON object of a file: ``field.metadata`` with what follows from the field itself."""
+    return {
+        **{key: value for key, value in field.metadata.items() if key != "digest"},
+        "format_version": list(FORMAT_VERSION),
+        "volume": {"name": field.grid.name, "matrix": np.asarray(field.grid.matrix, float).tolist()},
+        "resolution": list(field.grid.resolution),
+        "bands": field.bands,
+        "conventions": CONVENTIONS,
+    }
+
+
+def write(path, field: Field) -> None:
+    """Writes ``field`` to ``path``; the same field gives the same bytes.
+
+    Raises:
+        InputError: the field holds values that are not finite, or is too large for one file.
+        OSError: the file cannot be written.
+    """
+    import OpenEXR
+
+    check_size(field.grid, field.bands)
+    planes = _planes(field)
+    names = channel_names(field.bands)
+    finite = np.isfinite(planes).all(axis=(1, 2))
+    if not finite.all():
+        raise InputError(f"{field.grid.name}: channel {names[int(np.argmin(finite))]} holds values that are not finite; "
+                         "nothing was written")
+    text = _json(describe(field))
+    document = {**json.loads(text), "digest": _digest(text, planes)}
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, ATTRIBUTE: _json(document)}
+    # OpenEXR reports every failure as RuntimeError with its own wording; opening the file first gives the system's.
+    with open(path, "wb"):
+        pass
+    try:
+        with _silent_stderr():
+            OpenEXR.File(header, dict(zip(names, planes))).write(os.fspath(path))
+    except RuntimeError as error:
+        raise OSError(None, f"writing failed: {_reason(error)}", str(path)) from None
+
+
+def read(path) -> Field:
+    """The field in the file at ``path``.
+
+    Raises:
+        InputError: no probe file, a newer format, a truncated or damaged file, values that are not finite, or a size
+            beyond the limit. Nothing large is allocated before the header has been checked.
+    """
+    import OpenEXR
+
+    path = os.fspath(path)
+    try:
+        with open(path, "rb") as file:
+            magic = file.read(4)
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror}") from None
+    if magic != b"\x76\x2f\x31\x01":
+        raise InputError(f"{path} is not an OpenEXR file; name a probes.exr that Gridlight wrote")
+    try:
+        with _silent_stderr():
+            document, grid, bands = _check_header(path, OpenEXR.File(path, header_only=True).header())
+            channels = OpenEXR.File(path, separate_channels=True).channels()
+            planes = _gather(path, channels, grid, bands)
+    except (RuntimeError, ValueError, TypeError, OverflowError, UnicodeDecodeError) as error:
+        # What OpenEXR's binding raises for files that end early or contradict themselves.
+        raise InputError(f"{path} is truncated or damaged ({_reason(error)}); bake it again or restore a copy") from None
+    _check_values(path, document, planes, bands)
+    return _field(document, grid, bands, planes)
+
+
+def _planes(field: Field) -> np.ndarray:
+    """(channels, ny·nz, nx) float32, C order: all numbers of ``field``."""
+    nx, ny, nz = field.grid.resolution
+    count = field.grid.count
+    columns = [
+        np.asarray(field.coefficients, np.float32).reshape(count, -1),
+        np.asarray(field.state, np.float32)[:, None],
+        np.asarray(field.validity, np.float32)[:, None],
+        np.asarray(field.offset, np.float32),
+        np.asarray(field.depth[:, :, 0], np.float32),
+        np.asarray(field.depth[:, :, 1], np.float32),
+    ]
+    flat = np.concatenate(columns, axis=1)
+    return np.ascontiguousarray(flat.T).reshape(-1, ny * nz, nx)
+
+
+def _field(document: dict, grid: Grid, bands: int, planes: np.ndarray) -> Field:
+    flat = planes.reshape(len(planes), -1)
+    split = 3 * bands * bands
+    return Field(
+        grid,
+        np.ascontiguousarray(flat[:split].T).reshape(-1, bands * bands, 3),
+        flat[split].astype(np.uint8),
+        flat[split + 1].copy(),
+        np.ascontiguousarray(flat[split + 2 : split + 5].T),
+        np.ascontiguousarray(flat[split + 5 :].reshape(2, DEPTH_TEXELS, -1).transpose(2, 1, 0)),
+        document,
+    )
+
+
+def _check_header(path: str, header: dict) -> tuple[dict, Grid, int]:
+    """The JSON object, grid and bands that an EXR header announces, all consistent with its window and channels."""
+    text = header.get(ATTRIBUTE)
+    if not isinstance(text, str):
+        raise InputError(f"{path} is an OpenEXR image without Gridlight's data; name a probes.exr that Gridlight wrote")
+    try:
+        document = json.loads(text)
+    except ValueError:
+        raise InputError(f"{path} is damaged: its 'gridlight' attribute is not JSON") from None
+    if not isinstance(document, dict):
+        raise InputError(f"{path} is damaged: its 'gridlight' attribute is not a JSON object")
+    version = document.get("format_version")
+    if not (isinstance(version, list) and len(version) == 2 and all(type(part) is int for part in version)):
+        raise InputError(f"{path} is damaged: its format version is missing")
+    if version[0] > FORMAT_VERSION[0]:
+        raise InputError(f"{path} has format version {version[0]}.{version[1]}, this Gridlight reads up to "
+                         f"{FORMAT_VERSION[0]}; update Gridlight")
+    grid, bands = _announced_grid(path, document)
+    check_size(grid, bands)
+    low, high = (np.asarray(corner, np.int64) for corner in header["dataWindow"])
+    nx, ny, nz = grid.resolution
+    if tuple(high - low + 1) != (nx, ny * nz):
+        width, height = high - low + 1
+        raise InputError(f"{path} is damaged: {width}×{height} pixels for a resolution of {nx},{ny},{nz}")
+    present = {channel.name for channel in header["channels"]}
+    missing = [name for name in channel_names(bands) if name not in present]
+    if missing:
+        raise InputError(f"{path} is damaged or incomplete: channel {missing[0]} is missing ({len(missing)} in all)")
+    if len(present) > 4 * len(channel_names(MAX_BANDS)):
+        raise InputError(f"{path} has {len(present)} channels, far more than a probe file needs; it is not read")
+    return document, grid, bands
+
+
+def _announced_grid(path: str, document: dict) -> tuple[Grid, int]:
+    try:
+        matrix = np.array(document["volume"]["matrix"], float)
+        name = document["volume"]["name"]
+        resolution = tuple(document["resolution"])
+        bands = document["bands"]
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{path} is damaged: its description of the volume is incomplete ({_reason(error)})") from None
+    whole = all(type(number) is int for number in (*resolution, bands))
+    if matrix.shape != (4, 4) or len(resolution) != 3 or not whole or not 1 <= bands <= MAX_BANDS or not isinstance(name, str):
+        raise InputError(f"{path} is damaged: its volume, resolution or bands make no sense")
+    try:
+        return Grid(matrix, resolution, name), bands
+    except InputError as error:
+        raise InputError(f"{path} is damaged: {error}") from None
+
+
+def _gather(path: str, channels: dict, grid: Grid, bands: int) -> np.ndarray:
+    """(channels, ny·nz, nx) float32 in the order of ``channel_names``."""
+    nx, ny, nz = grid.resolution
+    planes = np.empty((len(channel_names(bands)), ny * nz, nx), np.float32)
+    for plane, name in zip(planes, channel_names(bands)):
+        pixels = channels[name].pixels
+        if pixels.dtype != np.float32 or pixels.shape != plane.shape:
+            raise InputError(f"{path} is damaged: channel {name} is {pixels.dtype} {pixels.shape}, "
+                             f"not 32-bit float {plane.shape}")
+        plane[:] = pixels
+    return planes
+
+
+def _check_values(path: str, document: dict, planes: np.ndarray, bands: int) -> None:
+    finite = np.isfinite(planes).all(axis=(1, 2))
+    if not finite.all():
+        name = channel_names(bands)[int(np.argmin(finite))]
+        raise InputError(f"{path}: channel {name} holds values that are not finite; bake it again")
+    if not np.isin(planes[3 * bands * bands], (CULLED, ACTIVE, INVALID)).all():
+        raise InputError(f"{path} is damaged: its probe states are not {CULLED}, {ACTIVE} or {INVALID}")
+    digest = document.pop("digest", None)
+    if digest is not None and digest != _digest(_json(document), planes):
+        raise InputError(f"{path} does not match its own checksum: it was damaged or edited; bake it again "
+                         "(or remove 'digest' from its 'gridlight' attribute to use it as it is)")
+
+
+def _json(document: dict) -> str:
+    return json.dumps(document, allow_nan=False, sort_keys=True, separators=(",", ":"))
+
+
+def _digest(text: str, planes: np.ndarray) -> str:
+    digest = hashlib.sha256(text.encode())
+    digest.update(np.ascontiguousarray(planes, "<f4"))
+    return digest.hexdigest()
+
+
+def _reason(error: Exception) -> str:
+    return " ".join(str(error).split())[:200] or type(error).__name__
+
+
+@contextlib.contextmanager
+def _silent_stderr():
+    """OpenEXR prints its errors on descriptor 2 as well as raising them; the user gets one line, ours."""
+    try:
+        sys.stderr.flush()
+        kept = os.dup(2)
+    except (OSError, AttributeError):  # no standard error at all, as in Blender on Windows started without a console
+        yield
+        return
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 2)
+    os.close(null)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files appear whole or not at all: everything is written under temporary names and renamed at the end."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ..core.errors import InputError
+
+
+class StagedFolder:
+    """A folder that receives the files of one run together.
+
+    Use as a context manager. ``path(name)`` gives the temporary path to write to, in the same folder and with the same
+    suffix; leaving the block normally renames all of them, leaving it by an exception removes them, and the folder too
+    where this run made it.
+
+    Raises:
+        InputError: on entry when the folder cannot be made or written, on exit when a file cannot take its name.
+    """
+
+    def __init__(self, folder):
+        self.folder = Path(folder)
+        self._staged: dict[str, Path] = {}
+        self._made: list[Path] = []
+
+    def __enter__(self):
+        missing = [folder for folder in (self.folder, *self.folder.parents) if not folder.exists()]
+        try:
+            for folder in reversed(missing):
+                folder.mkdir()
+                self._made.insert(0, folder)
+            probe = self._temporary("probe")
+            probe.write_bytes(b"")
+            probe.unlink()
+        except OSError as error:
+            self._discard()
+            raise InputError(f"cannot write to the folder {self.folder}: {error.strerror}; name another with -o") from None
+        return self
+
+    def __exit__(self, kind, error, _trace):
+        if kind is None:
+            try:
+                for name, temporary in self._staged.items():
+                    os.replace(temporary, self.folder / name)
+            except OSError as reason:
+                self._discard()
+                raise InputError(f"cannot write {self.folder / name}: {reason.strerror}") from None
+            return
+        self._discard()
+        if isinstance(error, OSError) and not isinstance(error, (BrokenPipeError, InterruptedError)):
+            raise InputError(f"cannot write to the folder {self.folder}: {error.strerror or error}") from None
+
+    def path(self, name: str) -> Path:
+        """Where to write what will be ``name``."""
+        self._staged[name] = self._temporary(name)
+        return self._staged[name]
+
+    @property
+    def names(self) -> list[str]:
+        return list(self._staged)
+
+    def _temporary(self, name: str) -> Path:
+        stem, suffix = os.path.splitext(name)
+        return self.folder / f".{stem}.{os.getpid()}.part{suffix}"
+
+    def _discard(self):
+        for temporary in self._staged.values():
+            temporary.unlink(missing_ok=True)
+        for folder in self._made:
+            try:
+                folder.rmdir()
+            except OSError:
+                break  # something else has been put there in the meantime: it stays
+
+
+def remove_leftovers(output, process: int) -> None:
+    """Removes the temporary files that process number ``process`` left when it was killed."""
+    output = Path(output)
+    for folder in (output, output.parent):
+        if folder.is_dir():
+            for leftover in folder.glob(f".*.{process}.part*"):
+                leftover.unlink(missing_ok=True)
