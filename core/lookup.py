@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The field's lookup, readable and slow: what iterations, preview, ``eval`` and exporters agree on.
+
+Irradiance at a point is the trilinear blend of the eight probes around it, each weighted by whether it sees the point
+(Chebyshev's inequality on the depth moments of its octahedral map; Donnelly and Lauritzen, I3D 2006; Majercik et al., JCGT 2019). There is no
+weight for the surface's orientation: it would bend the interpolation in open space, and a probe behind a wall is
+already found by its depth. Culled probes hang in free air, have no statistics and count as seen. Points outside the box are clamped to it. GLSL twin: lookup_lib.glsl and field_lib.glsl.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import spherical_harmonics as sh
+from .conventions import ACTIVE, DEPTH_EDGE, INVALID
+from .cubemap import octahedral_encode
+from .field import Field
+from .grid import Grid
+
+LEAST_WEIGHT = 1e-4  # of an active probe that does not see the point: decides only where none does
+INVALID_WEIGHT = 1e-7  # of probes inside solids, which carry their neighbours' light
+_POINTS_AT_ONCE = 1 << 15
+
+
+def depth_clamp(grid: Grid) -> float:
+    """Metres beyond which depth statistics do not look: one and a half diagonals of a cell."""
+    return 1.5 * float(np.linalg.norm(grid.cell_size()))
+
+
+def visibility_bias(grid: Grid) -> float:
+    """Metres that a surface point is moved along its normal before it is tested, so that its own surface does not hide it."""
+    return 0.1 * float(grid.cell_size().min())
+
+
+def least_deviation(grid: Grid) -> float:
+    """Metres of depth spread that are assumed even where a probe looks at a flat wall."""
+    return 0.02 * float(grid.cell_size().min())
+
+
+def lookup_weights(field: Field, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes (N, 8) and weights (N, 8), summing to 1, that make up the field at ``points`` (N, 3) with ``normals`` (N, 3)."""
+    grid = field.grid
+    resolution = np.array(grid.resolution)
+    to_lattice = grid.world_to_lattice()
+    lattice = np.clip(points @ to_lattice[:, :3].T + to_lattice[:, 3], 0, resolution - 1)
+    cell = np.minimum(lattice.astype(int), np.maximum(resolution - 2, 0))
+    blend = lattice - cell
+    corners = np.array([[c & 1, c >> 1 & 1, c >> 2] for c in range(8)])
+    weights = np.where(corners[None], blend[:, None], 1 - blend[:, None]).prod(axis=2)
+    node = np.minimum(cell[:, None] + corners, resolution - 1)
+    nodes = node[..., 0] + resolution[0] * (node[..., 1] + resolution[1] * node[..., 2])
+    seen_points = points + normals * visibility_bias(grid)
+    state = field.state[nodes]
+    seen = np.where(state == ACTIVE, np.maximum(visibility(field, nodes, seen_points), LEAST_WEIGHT), 1.0)
+    weights = weights * np.where(state == INVALID, INVALID_WEIGHT, seen)
+    return nodes, weights / weights.sum(axis=1, keepdims=True)
+
+
+def visibility(field: Field, nodes: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(N, 8) chance that each of ``nodes`` (N, 8) sees its point of ``points`` (N, 3)."""
+    probes = field.grid.positions()[nodes] + field.offset[nodes]
+    offset = points[:, None] - probes
+    distance = np.linalg.norm(offset, axis=2)
+    away = distance > 0
+    direction = np.where(away[..., None], offset, [0, 0, 1]) / np.where(away, distance, 1)[..., None]
+    moments = _sample_moments(field.depth, nodes, direction)
+    beyond = np.minimum(distance, depth_clamp(field.grid)) - moments[..., 0]
+    variance = np.maximum(moments[..., 1] - moments[..., 0] ** 2, least_deviation(field.grid) ** 2)
+    chance = variance / (variance + beyond * beyond)
+    return np.where(away & (beyond > 0), chance**3, 1.0)
+
+
+def irradiance(field: Field, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(N, 3) irradiance at world ``points`` (N, 3) with unit ``normals`` (N, 3). Not clamped: may ring below zero."""
+    points, normals = np.asarray(points, float), np.asarray(normals, float)
+    result = np.empty((len(points), 3))
+    for start in range(0, len(points), _POINTS_AT_ONCE):
+        part = slice(start, start + _POINTS_AT_ONCE)
+        nodes, weights = lookup_weights(field, points[part], normals[part])
+        blended = np.einsum("nw,nwkc->nkc", weights, field.coefficients[nodes].astype(float))
+        result[part] = sh.irradiance(blended, normals[part])
+    return result
+
+
+def _sample_moments(depth: np.ndarray, nodes: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """(…, 2) bilinear sample of octahedral ``depth`` (P, DEPTH_EDGE², 2) of ``nodes`` (…) along ``directions`` (…, 3)."""
+    position = (octahedral_encode(directions) * 0.5 + 0.5) * DEPTH_EDGE - 0.5
+    corner = np.floor(position).astype(int)
+    blend = position - corner
+    result = 0.0
+    for step in np.ndindex(2, 2):
+        texel = _wrap_octahedral(corner + step)
+        weight = np.where(step, blend, 1 - blend).prod(axis=-1)
+        result = result + weight[..., None] * depth[nodes, texel[..., 1] * DEPTH_EDGE + texel[..., 0]]
+    return result
+
+
+def _wrap_octahedral(texel: np.ndarray) -> np.ndarray:
+    """Texels one step past the edge of the map, brought to where the sphere goes on."""
+    texel = texel.copy()
+    for axis in (0, 1):
+        value = texel[..., axis]
+        past = (value < 0) | (value >= DEPTH_EDGE)
+        texel[..., 1 - axis] = np.where(past, DEPTH_EDGE - 1 - texel[..., 1 - axis], texel[..., 1 - axis])
+        texel[..., axis] = np.where(value < 0, -1 - value, np.where(value >= DEPTH_EDGE, 2 * DEPTH_EDGE - 1 - value, value))
+    return texel

@@ -1,0 +1,142 @@
+/* Direct light of Blender's lights at a diffuse surface. Units and formulas are Cycles' (tests prove each);
+ * reference: core/direct_light.py.
+ *
+ * lights, 6 elements each (scene_textures.py):
+ *   position, kind | color, radius | right, size x | up, size y | back, casts shadow | parameters of the kind
+ */
+
+const int POINT = 0, SPOT = 1, SUN = 2, RECTANGLE = 3, ELLIPSE = 4;
+
+struct LightSample {
+  vec3 direction; /* unit, towards the light */
+  float distance;
+  vec3 irradiance; /* per unit cosine at the surface: radiance × solid angle of the whole light */
+};
+
+vec2 sample_disk(vec2 u)
+{
+  float r = sqrt(u.x), phi = 6.283185307179586 * u.y;
+  return r * vec2(cos(phi), sin(phi));
+}
+
+/* Two unit vectors perpendicular to n: Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 2017. */
+void tangent_frame(vec3 n, out vec3 t, out vec3 b)
+{
+  float s = n.z >= 0.0 ? 1.0 : -1.0;
+  float a = -1.0 / (s + n.z);
+  float c = n.x * n.y * a;
+  t = vec3(1.0 + s * n.x * n.x * a, s * c, -s * n.x);
+  b = vec3(c, s + n.y * n.y * a, -n.y);
+}
+
+/* Is one sample exact, because the light has no extent? */
+bool light_is_sharp(vec4 position_kind, vec4 color_radius)
+{
+  return int(position_kind.w) < RECTANGLE && color_radius.w == 0.0;
+}
+
+float spot_mask(vec3 towards, vec3 back, vec4 parameters)
+{
+  float x = clamp((dot(towards, back) - parameters.x) * parameters.y, 0.0, 1.0);
+  return x * x * (3.0 - 2.0 * x);
+}
+
+LightSample sample_light(int light, vec3 point, vec2 u)
+{
+  vec4 position_kind = element(lights, 6 * light);
+  vec4 color_radius = element(lights, 6 * light + 1);
+  vec4 back_shadow = element(lights, 6 * light + 4);
+  vec4 parameters = element(lights, 6 * light + 5);
+  int kind = int(position_kind.w);
+  float radius = color_radius.w;
+  LightSample light_sample;
+  vec3 t, b;
+
+  if (kind == SUN) {
+    /* a cone of radiance strength/(π sin²), so that a facing surface gets exactly the strength; radius is 1 − cos of half the
+     * apparent angle */
+    tangent_frame(back_shadow.xyz, t, b);
+    float cosine = 1.0 - u.x * radius;
+    float sine = sqrt(max(1.0 - cosine * cosine, 0.0)), phi = 6.283185307179586 * u.y;
+    light_sample.direction = cosine * back_shadow.xyz + sine * (cos(phi) * t + sin(phi) * b);
+    light_sample.distance = NO_HIT;
+    light_sample.irradiance = color_radius.rgb * (2.0 / (2.0 - radius));
+    return light_sample;
+  }
+  vec3 to_centre = position_kind.xyz - point;
+  if (kind >= RECTANGLE) {
+    vec4 right = element(lights, 6 * light + 2);
+    vec4 up = element(lights, 6 * light + 3);
+    vec2 place = kind == ELLIPSE ? 0.5 * sample_disk(u) : u - 0.5;
+    vec3 to_light = to_centre + place.x * right.w * right.xyz + place.y * up.w * up.xyz;
+    light_sample.distance = length(to_light);
+    light_sample.direction = to_light / max(light_sample.distance, 1.0e-20);
+    float cosine = dot(light_sample.direction, back_shadow.xyz);
+    float area = right.w * up.w * (kind == ELLIPSE ? 0.7853981633974483 : 1.0);
+    /* the light shines along −back: the surface must lie in front of it */
+    cosine = -cosine;
+    float spread = 1.0;
+    if (parameters.y > 0.0) {
+      float tangent = sqrt(max(1.0 - cosine * cosine, 0.0)) / max(cosine, 1.0e-6);
+      spread = max((parameters.x - tangent) * parameters.y, 0.0);
+    }
+    light_sample.irradiance = color_radius.rgb *
+                              (spread * max(cosine, 0.0) * area / max(light_sample.distance * light_sample.distance, 1.0e-20));
+    return light_sample;
+  }
+  float squared = max(dot(to_centre, to_centre), 1.0e-20);
+  float centre_distance = sqrt(squared);
+  vec3 axis = to_centre / centre_distance;
+  tangent_frame(axis, t, b);
+  if (radius == 0.0) {
+    light_sample.direction = axis;
+    light_sample.distance = centre_distance;
+    light_sample.irradiance = color_radius.rgb / squared;
+  }
+  else if (parameters.z != 0.0 || centre_distance <= radius) {
+    /* soft falloff: a disk of radiance I/(πr²) that faces the surface */
+    vec2 disk = radius * sample_disk(u);
+    vec3 to_light = to_centre + disk.x * t + disk.y * b;
+    float sample_squared = dot(to_light, to_light);
+    light_sample.distance = sqrt(sample_squared);
+    light_sample.direction = to_light / light_sample.distance;
+    light_sample.irradiance = color_radius.rgb * centre_distance / (light_sample.distance * sample_squared);
+  }
+  else {
+    /* a sphere of radiance I/(πr²), sampled over the cone that it fills */
+    float sine_squared = radius * radius / squared;
+    float cos_max = sqrt(1.0 - sine_squared);
+    float one_minus_cos = sine_squared / (1.0 + cos_max);
+    float cosine = 1.0 - u.x * one_minus_cos;
+    float sine = sqrt(max(1.0 - cosine * cosine, 0.0));
+    float phi = 6.283185307179586 * u.y;
+    light_sample.direction = cosine * axis + sine * (cos(phi) * t + sin(phi) * b);
+    light_sample.distance = centre_distance * cosine -
+                            sqrt(max(radius * radius - squared * (1.0 - cosine * cosine), 0.0));
+    light_sample.irradiance = color_radius.rgb * (2.0 * one_minus_cos / (radius * radius));
+  }
+  if (kind == SPOT) {
+    light_sample.irradiance *= spot_mask(light_sample.direction, back_shadow.xyz, parameters);
+  }
+  return light_sample;
+}
+
+/* Irradiance of one light at a surface, `samples` shadow rays where the light is soft. */
+vec3 light_irradiance(int light, vec3 point, vec3 origin, vec3 normal, uvec3 key, int samples)
+{
+  vec4 position_kind = element(lights, 6 * light);
+  vec4 color_radius = element(lights, 6 * light + 1);
+  bool shadow = element(lights, 6 * light + 4).w != 0.0;
+  int count = light_is_sharp(position_kind, color_radius) ? 1 : samples;
+  vec3 sum = vec3(0.0);
+  for (int i = 0; i < count; i++) {
+    LightSample light_sample = sample_light(light, point, sample_r2(key, i));
+    float cosine = dot(light_sample.direction, normal);
+    if (cosine > 0.0 && light_sample.irradiance != vec3(0.0)) {
+      if (!shadow || !trace_any(origin, light_sample.direction, light_sample.distance * 0.9999)) {
+        sum += light_sample.irradiance * cosine;
+      }
+    }
+  }
+  return sum / float(count);
+}

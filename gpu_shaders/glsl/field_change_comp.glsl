@@ -1,0 +1,33 @@
+/* How far two iterations are apart: sums over active probes.
+ *
+ * Dispatch: one group of 256 threads; fixed order of summation. Writes one texel: |new|², |new − old|², 0, luminance of
+ * band 0.
+ */
+
+SHARED_ vec4 partial_sums[256];
+
+void main()
+{
+  int thread = int(gl_LocalInvocationID.x);
+  vec4 sum = vec4(0.0);
+  int total = slot_count * COEFFICIENTS;
+  for (int i = thread; i < total; i += 256) {
+    int slot = i / COEFFICIENTS;
+    int c = i - slot * COEFFICIENTS;
+    int at = int(element(probe_slots, slot).w) * COEFFICIENTS + c;
+    vec3 fresh = element(field_new, at).rgb;
+    vec3 change = fresh - element(field_old, at).rgb;
+    sum += vec4(dot(fresh, fresh), dot(change, change), 0.0, c == 0 ? dot(fresh, vec3(0.2126, 0.7152, 0.0722)) : 0.0);
+  }
+  partial_sums[thread] = sum;
+  barrier();
+  for (int half_count = 128; half_count > 0; half_count /= 2) {
+    if (thread < half_count) {
+      partial_sums[thread] += partial_sums[thread + half_count];
+    }
+    barrier();
+  }
+  if (thread == 0) {
+    imageStore(change, ivec2(0), partial_sums[0]);
+  }
+}

@@ -1,0 +1,92 @@
+/* The field's lookup: trilinear between the eight probes of a cell, weighted by whether each probe sees the point.
+ * Reference and reasons: core/lookup.py. Chebyshev's inequality for visibility: Donnelly and Lauritzen, "Variance Shadow Maps",
+ * I3D 2006; in probe grids: Majercik et al., "Dynamic Diffuse Global Illumination with Ray-Traced Irradiance Fields", JCGT 2019.
+ *
+ * grid_info: rows of world-to-lattice (0..2); resolution, depth clamp (3); visibility bias, least deviation (4)
+ * grid_nodes, 1 element a node: capture position, slot of an active probe, −1 culled, −2 invalid
+ * depth_moments: DEPTH_EDGE² elements a slot, (mean, mean square) of clamped distance
+ */
+
+int node_index(ivec3 node)
+{
+  ivec3 resolution = ivec3(grid_info[3].xyz);
+  return node.x + resolution.x * (node.y + resolution.y * node.z);
+}
+
+ivec2 wrap_octahedral(ivec2 texel)
+{
+  if (texel.x < 0 || texel.x >= DEPTH_EDGE) {
+    texel = ivec2(texel.x < 0 ? -1 - texel.x : 2 * DEPTH_EDGE - 1 - texel.x, DEPTH_EDGE - 1 - texel.y);
+  }
+  if (texel.y < 0 || texel.y >= DEPTH_EDGE) {
+    texel = ivec2(DEPTH_EDGE - 1 - texel.x, texel.y < 0 ? -1 - texel.y : 2 * DEPTH_EDGE - 1 - texel.y);
+  }
+  return texel;
+}
+
+vec2 fetch_moments(int slot, ivec2 texel)
+{
+  texel = wrap_octahedral(texel);
+  return element(depth_moments, (slot * DEPTH_EDGE + texel.y) * DEPTH_EDGE + texel.x).xy;
+}
+
+vec2 sample_moments(int slot, vec3 direction)
+{
+  vec2 position = (octahedral_encode(direction) * 0.5 + 0.5) * float(DEPTH_EDGE) - 0.5;
+  ivec2 corner = ivec2(floor(position));
+  vec2 blend = position - vec2(corner);
+  return mix(mix(fetch_moments(slot, corner), fetch_moments(slot, corner + ivec2(1, 0)), blend.x),
+             mix(fetch_moments(slot, corner + ivec2(0, 1)), fetch_moments(slot, corner + ivec2(1, 1)), blend.x), blend.y);
+}
+
+/* How likely the probe in `slot` sees `point`, 0..1. */
+float visibility(int slot, vec3 probe, vec3 point)
+{
+  vec3 offset = point - probe;
+  float squared = dot(offset, offset);
+  if (squared == 0.0) {
+    return 1.0;
+  }
+  float range = min(sqrt(squared), grid_info[3].w);
+  vec2 moments = sample_moments(slot, offset * inversesqrt(squared));
+  if (range <= moments.x) {
+    return 1.0;
+  }
+  float variance = max(moments.y - moments.x * moments.x, grid_info[4].y * grid_info[4].y);
+  float beyond = range - moments.x;
+  float chance = variance / (variance + beyond * beyond);
+  return chance * chance * chance;
+}
+
+/* First corner of the cell around `point` and the weights of its eight corners (x fastest), which sum to 1. */
+ivec3 lookup_cell(vec3 point, vec3 normal, out float weights[8])
+{
+  ivec3 resolution = ivec3(grid_info[3].xyz);
+  vec4 homogeneous = vec4(point, 1.0);
+  vec3 lattice = vec3(dot(grid_info[0], homogeneous), dot(grid_info[1], homogeneous), dot(grid_info[2], homogeneous));
+  lattice = clamp(lattice, vec3(0.0), vec3(resolution - 1));
+  ivec3 cell = min(ivec3(lattice), max(resolution - 2, ivec3(0)));
+  vec3 blend = lattice - vec3(cell);
+  vec3 seen_point = point + normal * grid_info[4].x;
+  float sum = 0.0;
+  for (int corner = 0; corner < 8; corner++) {
+    ivec3 step = ivec3(corner & 1, (corner >> 1) & 1, corner >> 2);
+    vec3 part = mix(1.0 - blend, blend, vec3(step));
+    float weight = part.x * part.y * part.z;
+    if (weight > 0.0) {
+      vec4 node = element(grid_nodes, node_index(cell + step));
+      if (node.w >= 0.0) {
+        weight *= max(visibility(int(node.w), node.xyz, seen_point), LEAST_WEIGHT);
+      }
+      else if (node.w < -1.0) {
+        weight *= INVALID_WEIGHT;
+      }
+    }
+    weights[corner] = weight;
+    sum += weight;
+  }
+  for (int corner = 0; corner < 8; corner++) {
+    weights[corner] /= sum;
+  }
+  return cell;
+}

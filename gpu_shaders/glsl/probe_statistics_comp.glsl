@@ -1,0 +1,58 @@
+/* What each probe sees as a whole: the depth statistics of its lookup and the share of back faces.
+ *
+ * Dispatch: one group of 64 threads a probe; thread t makes texel t of the octahedral map from 16 directions spread over one and a
+ * half texels, so that neighbouring texels overlap and the map has no seams.
+ * Objects in `object_flips` have their normals the wrong way round (core/orientation.py).
+ * Writes depth_moments (mean, mean square of the clamped distance) and probe_shares (back-face share, background share).
+ */
+
+SHARED_ vec2 partial_shares[64];
+
+void main()
+{
+  int probe = int(gl_WorkGroupID.x);
+  int thread = int(gl_LocalInvocationID.x);
+  int slot = first_slot + probe;
+  int layer = first_layer + probe;
+
+  vec2 texel = vec2(thread % DEPTH_EDGE, thread / DEPTH_EDGE);
+  vec2 moments = vec2(0.0);
+  for (int i = 0; i < 16; i++) {
+    vec2 place = texel + 0.5 + (vec2(i & 3, i >> 2) - 1.5) * 0.375;
+    vec2 uv = place * (2.0 / float(DEPTH_EDGE)) - 1.0;
+    /* past the edge of the map the sphere goes on where the edge is mirrored to */
+    if (abs(uv.x) > 1.0) {
+      uv = vec2(sign(uv.x) * 2.0 - uv.x, -uv.y);
+    }
+    if (abs(uv.y) > 1.0) {
+      uv = vec2(-uv.x, sign(uv.y) * 2.0 - uv.y);
+    }
+    vec3 direction = octahedral_decode(uv);
+    float range = abs(texelFetch(geometry, ivec3(direction_texel(direction), layer), 0).z);
+    range = min(range, depth_clamp);
+    moments += vec2(range, range * range);
+  }
+  imageStore(depth_moments, element_position(slot * DEPTH_EDGE * DEPTH_EDGE + thread), vec4(moments / 16.0, 0.0, 0.0));
+
+  vec2 share = vec2(0.0);
+  for (int i = thread; i < 6 * FACE * FACE; i += 64) {
+    ivec2 at = ivec2(i % FACE, i / FACE);
+    vec2 seen = texelFetch(geometry, ivec3(at, layer), 0).zw;
+    float weight = element(texel_weights, (at.y % FACE) * FACE + at.x).x;
+    if (seen.x >= NO_SURFACE) {
+      share.y += weight;
+    }
+    else if ((seen.x < 0.0) != (element(object_flips, int(seen.y)).x != 0.0)) {
+      share.x += weight;
+    }
+  }
+  partial_shares[thread] = share;
+  barrier();
+  if (thread == 0) {
+    vec2 sum = vec2(0.0);
+    for (int i = 0; i < 64; i++) {
+      sum += partial_shares[i];
+    }
+    imageStore(probe_shares, element_position(slot), vec4(sum / 12.566370614359172, 0.0, 0.0));
+  }
+}

@@ -1,0 +1,183 @@
+/* Rays through the four-wide hierarchy of core/bvh.py.
+ *
+ * Nodes are entered in order of distance; the stack holds what is left, STACK_SIZE entries at most (known when the
+ * hierarchy is built). The triangle test is watertight: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection",
+ * JCGT 2013. Both sides of a triangle are hit. With HAS_ALPHA, triangles of clipped materials ask surface_lib's
+ * `is_hole` first.
+ *
+ * Samplers: bvh_nodes, triangle_corners.
+ */
+
+const float NO_HIT = 3.0e38;
+
+struct Ray {
+  vec3 origin;
+  vec3 direction;
+  vec3 inverse;
+  ivec3 near_texel; /* texel of a node that holds the near plane of each axis */
+  int axis;         /* largest component of the direction */
+  vec3 shear;
+};
+
+struct Hit {
+  float distance; /* NO_HIT where nothing was hit */
+  int triangle;
+  vec2 barycentric; /* weights of corners 1 and 2 */
+};
+
+vec3 permute(vec3 v, int axis)
+{
+  return axis == 0 ? v.yzx : axis == 1 ? v.zxy : v;
+}
+
+Ray make_ray(vec3 origin, vec3 direction)
+{
+  Ray ray;
+  ray.origin = origin;
+  ray.direction = direction;
+  /* A component of zero becomes tiny: planes then lie far away instead of at 0·∞. */
+  vec3 safe = mix(direction, vec3(1.0e-20), lessThan(abs(direction), vec3(1.0e-20)));
+  ray.inverse = 1.0 / safe;
+  ray.near_texel = ivec3(safe.x < 0.0 ? 3 : 0, safe.y < 0.0 ? 4 : 1, safe.z < 0.0 ? 5 : 2);
+  vec3 size = abs(direction);
+  ray.axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+  vec3 d = permute(direction, ray.axis);
+  ray.shear = vec3(d.xy, 1.0) / d.z;
+  return ray;
+}
+
+/* Distance at which each of a node's four boxes is entered, NO_HIT where one is missed or lies beyond `limit`. */
+vec4 enter_boxes(Ray ray, int node, float limit)
+{
+  int base = node * 7;
+  ivec3 near = ray.near_texel;
+  ivec3 far = ivec3(3, 5, 7) - near;
+  vec4 entry = max(max((element(bvh_nodes, base + near.x) - ray.origin.x) * ray.inverse.x,
+                       (element(bvh_nodes, base + near.y) - ray.origin.y) * ray.inverse.y),
+                   max((element(bvh_nodes, base + near.z) - ray.origin.z) * ray.inverse.z, vec4(0.0)));
+  vec4 leave = min(min((element(bvh_nodes, base + far.x) - ray.origin.x) * ray.inverse.x,
+                       (element(bvh_nodes, base + far.y) - ray.origin.y) * ray.inverse.y),
+                   min((element(bvh_nodes, base + far.z) - ray.origin.z) * ray.inverse.z, vec4(limit)));
+  /* Ize, "Robust BVH Ray Traversal", JCGT 2013: two ulps keep rounding from opening seams. */
+  leave *= 1.00000024;
+  return mix(vec4(NO_HIT), entry, lessThanEqual(entry, leave));
+}
+
+/* Tests triangle `index`; on a hit nearer than hit.distance replaces it. Returns true where its leaf ends. */
+bool intersect_triangle(Ray ray, int index, inout Hit hit)
+{
+  vec4 corner = element(triangle_corners, 3 * index);
+  vec4 corner1 = element(triangle_corners, 3 * index + 1);
+  vec4 corner2 = element(triangle_corners, 3 * index + 2);
+  vec3 a = permute(corner.xyz - ray.origin, ray.axis);
+  vec3 b = permute(corner1.xyz - ray.origin, ray.axis);
+  vec3 c = permute(corner2.xyz - ray.origin, ray.axis);
+  EXACT vec2 pa = a.xy - ray.shear.xy * a.z;
+  EXACT vec2 pb = b.xy - ray.shear.xy * b.z;
+  EXACT vec2 pc = c.xy - ray.shear.xy * c.z;
+  EXACT float u = pc.x * pb.y - pc.y * pb.x;
+  EXACT float v = pa.x * pc.y - pa.y * pc.x;
+  EXACT float w = pb.x * pa.y - pb.y * pa.x;
+  bool miss = min(u, min(v, w)) < 0.0 && max(u, max(v, w)) > 0.0;
+  float determinant = u + v + w;
+  if (!miss && determinant != 0.0) {
+    float distance = (u * a.z + v * b.z + w * c.z) * ray.shear.z / determinant;
+    if (distance > 0.0 && distance < hit.distance) {
+      vec2 barycentric = vec2(v, w) / determinant;
+#ifdef HAS_ALPHA
+      if (corner1.w != 0.0 && is_hole(index, barycentric)) {
+        return corner.w != 0.0;
+      }
+#endif
+      hit.distance = distance;
+      hit.triangle = index;
+      hit.barycentric = barycentric;
+    }
+  }
+  return corner.w != 0.0;
+}
+
+#define ORDER(i, j) \
+  if (entry[j] < entry[i]) { \
+    float swap_entry = entry[i]; entry[i] = entry[j]; entry[j] = swap_entry; \
+    float swap_child = child[i]; child[i] = child[j]; child[j] = swap_child; \
+  }
+
+Hit trace_closest(vec3 origin, vec3 direction)
+{
+  Ray ray = make_ray(origin, direction);
+  Hit hit = Hit(NO_HIT, -1, vec2(0.0));
+  int stack[STACK_SIZE];
+  float stack_entry[STACK_SIZE];
+  int top = 0;
+  int item = 0;
+  while (true) {
+    if (item >= 0) {
+      vec4 entry = enter_boxes(ray, item, hit.distance);
+      vec4 child = element(bvh_nodes, item * 7 + 6);
+      ORDER(0, 1) ORDER(2, 3) ORDER(0, 2) ORDER(1, 3) ORDER(1, 2)
+      for (int i = 3; i >= 0; i--) {
+        if (entry[i] < NO_HIT) {
+          stack[top] = int(child[i]);
+          stack_entry[top] = entry[i];
+          top++;
+        }
+      }
+    }
+    else {
+      int index = -1 - item;
+      while (!intersect_triangle(ray, index, hit)) {
+        index++;
+      }
+    }
+    do {
+      if (top == 0) {
+        return hit;
+      }
+      top--;
+    } while (stack_entry[top] > hit.distance);
+    item = stack[top];
+  }
+}
+
+/* Is anything hit nearer than `limit`? */
+bool trace_any(vec3 origin, vec3 direction, float limit)
+{
+  Ray ray = make_ray(origin, direction);
+  Hit hit = Hit(limit, -1, vec2(0.0));
+  int stack[STACK_SIZE];
+  int top = 0;
+  int item = 0;
+  while (true) {
+    if (item >= 0) {
+      vec4 entry = enter_boxes(ray, item, limit);
+      vec4 child = element(bvh_nodes, item * 7 + 6);
+      for (int i = 0; i < 4; i++) {
+        if (entry[i] < NO_HIT) {
+          stack[top++] = int(child[i]);
+        }
+      }
+    }
+    else {
+      int index = -1 - item;
+      while (!intersect_triangle(ray, index, hit)) {
+        index++;
+      }
+      if (hit.triangle >= 0) {
+        return true;
+      }
+    }
+    if (top == 0) {
+      return false;
+    }
+    item = stack[--top];
+  }
+}
+
+/* Steps off a surface before a secondary ray starts: the rounding error of a hit point grows with the coordinates and with the
+ * distance of the ray that found it, so the step does too. `towards` points back to where that ray came from. */
+vec3 step_off(vec3 point, vec3 normal, vec3 towards, float distance)
+{
+  float magnitude = max(max(abs(point.x), abs(point.y)), max(abs(point.z), distance));
+  return point + (normal + towards) * (magnitude * 3.8e-6);
+}

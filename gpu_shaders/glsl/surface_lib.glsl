@@ -1,0 +1,126 @@
+/* What a hit surface is made of: attributes of a triangle, its material, its images.
+ *
+ * Layouts are written by scene_textures.py:
+ *   triangle_attributes, 5 elements a triangle: normals and (material, object, texture scale) in w; uv0 uv1; uv2
+ *   materials, 3 elements: diffuse albedo, base image | emission, emission image | alpha, threshold, alpha image, alpha from colour
+ *   image_table, 1 element: first row in image_texels, width, height, extension
+ *   image_texels: linear RGBA, mip levels of an image one after the other
+ */
+
+vec3 interpolate(vec3 a, vec3 b, vec3 c, vec2 barycentric)
+{
+  return a * (1.0 - barycentric.x - barycentric.y) + b * barycentric.x + c * barycentric.y;
+}
+
+#ifdef HAS_IMAGES
+const int REPEAT = 0, EXTEND = 1, CLIP = 2, MIRROR = 3;
+
+int wrap_texel(int i, int size, int extension)
+{
+  if (extension == REPEAT) {
+    return i - size * int(floor(float(i) / float(size)));
+  }
+  if (extension == MIRROR) {
+    int period = i - 2 * size * int(floor(float(i) / float(2 * size)));
+    return period < size ? period : 2 * size - 1 - period;
+  }
+  return clamp(i, 0, size - 1);
+}
+
+/* Bilinear sample; `footprint` is the width of the sampled area in uv units and picks the mip level. */
+vec4 sample_image(int image, vec2 uv, float footprint)
+{
+  vec4 entry = element(image_table, image);
+  ivec2 size = ivec2(entry.yz);
+  int extension = int(entry.w);
+  if (extension == CLIP && (min(uv.x, uv.y) < 0.0 || max(uv.x, uv.y) > 1.0)) {
+    return vec4(0.0);
+  }
+  int start = int(entry.x) * 4096;
+  int level = int(clamp(log2(max(footprint * float(max(size.x, size.y)), 1.0)) + 0.5, 0.0, 16.0));
+  for (int i = 0; i < level && max(size.x, size.y) > 1; i++) {
+    start += size.x * size.y;
+    size = max(size / 2, ivec2(1));
+  }
+  vec2 position = uv * vec2(size) - 0.5;
+  ivec2 corner = ivec2(floor(position));
+  vec2 blend = position - vec2(corner);
+  ivec2 low = ivec2(wrap_texel(corner.x, size.x, extension), wrap_texel(corner.y, size.y, extension));
+  ivec2 high = ivec2(wrap_texel(corner.x + 1, size.x, extension), wrap_texel(corner.y + 1, size.y, extension));
+  vec4 bottom = mix(element(image_texels, start + low.y * size.x + low.x),
+                    element(image_texels, start + low.y * size.x + high.x), blend.x);
+  vec4 top = mix(element(image_texels, start + high.y * size.x + low.x),
+                 element(image_texels, start + high.y * size.x + high.x), blend.x);
+  return mix(bottom, top, blend.y);
+}
+
+vec2 triangle_uv(int triangle, vec2 barycentric)
+{
+  vec4 uv01 = element(triangle_attributes, 5 * triangle + 3);
+  vec4 uv2 = element(triangle_attributes, 5 * triangle + 4);
+  return uv01.xy * (1.0 - barycentric.x - barycentric.y) + uv01.zw * barycentric.x + uv2.xy * barycentric.y;
+}
+#endif
+
+#ifdef HAS_ALPHA
+/* Is the material clipped away here? Sampled at full resolution: a mip would thin out leaves. */
+bool is_hole(int triangle, vec2 barycentric)
+{
+  int material = int(element(triangle_attributes, 5 * triangle).w);
+  vec4 clip = element(materials, 3 * material + 2);
+  float alpha = clip.x;
+#ifdef HAS_IMAGES
+  if (clip.z >= 0.0) {
+    vec4 texel = sample_image(int(clip.z), triangle_uv(triangle, barycentric), 0.0);
+    alpha *= clip.w != 0.0 ? dot(texel.rgb, vec3(1.0 / 3.0)) : texel.a;
+  }
+#endif
+  return alpha < clip.y;
+}
+#endif
+
+struct Surface {
+  vec3 position;
+  vec3 normal; /* shading normal, on the viewer's side */
+  bool back;   /* seen from behind */
+  int object;
+  vec3 albedo;
+  vec3 emission;
+};
+
+/* Surface at `barycentric` of `triangle` seen along `direction`; `spread` is the angular width of the view, radians. */
+Surface resolve_surface(int triangle, vec2 barycentric, vec3 origin, vec3 direction, float spread)
+{
+  Surface surface;
+  vec3 a = element(triangle_corners, 3 * triangle).xyz;
+  vec3 b = element(triangle_corners, 3 * triangle + 1).xyz;
+  vec3 c = element(triangle_corners, 3 * triangle + 2).xyz;
+  surface.position = interpolate(a, b, c, barycentric);
+  vec3 geometric = cross(b - a, c - a);
+  surface.back = dot(geometric, direction) > 0.0;
+  vec4 n0 = element(triangle_attributes, 5 * triangle);
+  vec4 n1 = element(triangle_attributes, 5 * triangle + 1);
+  vec4 n2 = element(triangle_attributes, 5 * triangle + 2);
+  surface.normal = normalize(interpolate(n0.xyz, n1.xyz, n2.xyz, barycentric));
+  surface.normal = surface.back ? -surface.normal : surface.normal;
+  surface.object = int(n1.w);
+  int material = int(n0.w);
+  vec4 base = element(materials, 3 * material);
+  vec4 emission = element(materials, 3 * material + 1);
+  surface.albedo = base.rgb;
+  surface.emission = emission.rgb;
+#ifdef HAS_IMAGES
+  if (max(base.w, emission.w) >= 0.0) {
+    vec2 uv = triangle_uv(triangle, barycentric);
+    float slant = max(abs(dot(normalize(geometric), direction)), 0.1);
+    float footprint = length(surface.position - origin) * spread * inversesqrt(slant) * n2.w;
+    if (base.w >= 0.0) {
+      surface.albedo *= sample_image(int(base.w), uv, footprint).rgb;
+    }
+    if (emission.w >= 0.0) {
+      surface.emission *= sample_image(int(emission.w), uv, footprint).rgb;
+    }
+  }
+#endif
+  return surface;
+}

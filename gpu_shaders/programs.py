@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Compiled shaders: sources put together with their libraries, compiled once per set of defines."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import gpu
+
+from ..core.errors import NoGpuError
+from . import create_infos
+
+_GLSL = Path(__file__).parent / "glsl"
+
+# Never emptied: in Blender 4.5 and 5.0 the address of a freed shader can be reused, and the old program then runs silently.
+_programs: dict[tuple, gpu.types.GPUShader] = {}
+
+
+def program(name: str, **defines) -> gpu.types.GPUShader:
+    """The compiled shader ``name`` (a function of ``create_infos``) with ``defines``.
+
+    A define of None or False is left out, True is defined empty.
+
+    Raises:
+        NoGpuError: the driver does not compile it.
+    """
+    chosen = tuple(sorted((key, value) for key, value in defines.items() if value is not None and value is not False))
+    key = (name, chosen)
+    if key not in _programs:
+        _programs[key] = _compile(name, dict(chosen))
+    return _programs[key]
+
+
+def _compile(name: str, defines: dict) -> gpu.types.GPUShader:
+    info = gpu.types.GPUShaderCreateInfo()
+    info.define("EXACT", "" if gpu.platform.backend_type_get() == "METAL" else "precise")
+    # Blender 5.2 strips the word itself from compute sources; it survives in a define.
+    info.define("SHARED_", "shared")
+    for key, value in defines.items():
+        info.define(key, "" if value is True else str(value))
+    stages = getattr(create_infos, name)(info, defines)
+    for stage, files in stages.items():
+        getattr(info, f"{stage}_source")("\n".join(_source(file) for file in files))
+    try:
+        return gpu.shader.create_from_info(info)
+    except Exception as error:  # the binding raises bare Exception("Shader Compile Error, …") and nothing narrower
+        raise NoGpuError(f"the graphics driver does not compile shader '{name}': {error}; update the driver") from error
+
+
+@lru_cache(maxsize=None)
+def _source(file: str) -> str:
+    return (_GLSL / f"{file}.glsl").read_text(encoding="utf-8")

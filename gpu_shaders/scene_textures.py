@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A scene snapshot as textures: hierarchy, triangles, materials, images and lights.
+
+All positions are relative to an origin (the volume's centre), so a scene far from the world's origin loses nothing to float32.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..core import bvh
+from ..core.snapshot import Image, Light, SceneSnapshot
+from .textures import ROW, upload
+
+_EXTENSIONS = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2, "MIRROR": 3}
+_POINT, _SPOT, _SUN, _RECTANGLE, _ELLIPSE = range(5)
+
+
+class SceneTextures:
+    """Everything that shaders read about the scene.
+
+    ``defines`` are what every shader that touches surfaces must be compiled with; ``bind`` hands it the textures it declares.
+    """
+
+    def __init__(self, snapshot: SceneSnapshot, origin: np.ndarray):
+        corners = (snapshot.triangle_positions - origin).astype(np.float32)
+        self.hierarchy = bvh.build(corners)
+        order = self.hierarchy.order
+        self.triangle_count = len(order)
+        self.corners = corners[order]
+        clips = np.array([m.alpha_threshold > 0 for m in snapshot.materials] or [False])
+        self.has_alpha = bool(clips.any())
+        self.has_images = bool(snapshot.images)
+        self.light_count = len(snapshot.lights)
+
+        material = np.clip(snapshot.material_index[order], 0, max(len(snapshot.materials) - 1, 0))
+        rows = np.zeros((self.triangle_count, 3, 4), np.float32)
+        rows[:, :, :3] = self.corners
+        rows[:, 0, 3] = self.hierarchy.leaf_end
+        rows[:, 1, 3] = clips[material]
+        self._textures = {
+            "bvh_nodes": upload(self.hierarchy.nodes, "hierarchy nodes"),
+            "triangle_corners": upload(rows, "triangle corners"),
+            "triangle_attributes": upload(_attributes(snapshot, order, material, self.corners), "triangle attributes"),
+            "materials": upload(_materials(snapshot), "materials"),
+            "lights": upload(pack_lights(snapshot.lights, origin), "lights"),
+        }
+        if self.has_images:
+            table, texels = _pack_images(snapshot.images)
+            self._textures["image_table"] = upload(table, "images")
+            self._textures["image_texels"] = upload(texels, "image texels", "RGBA16F")
+        self._defines = {"HAS_ALPHA": self.has_alpha, "HAS_IMAGES": self.has_images,
+                         "STACK_SIZE": self.hierarchy.stack_size}
+
+    @property
+    def surface_defines(self) -> dict:
+        return {key: self._defines[key] for key in ("HAS_ALPHA", "HAS_IMAGES")}
+
+    @property
+    def ray_defines(self) -> dict:
+        """For shaders that trace rays; images matter to them only where surfaces have holes."""
+        return {"HAS_ALPHA": self.has_alpha, "HAS_IMAGES": self.has_alpha and self.has_images,
+                "STACK_SIZE": self.hierarchy.stack_size}
+
+    def bind(self, shader, *names: str) -> None:
+        for name in names:
+            shader.uniform_sampler(name, self._textures[name])
+
+    def bind_rays(self, shader) -> None:
+        """Binds what a shader compiled with ``ray_defines`` and no surfaces declares."""
+        self.bind(shader, "bvh_nodes", "triangle_corners")
+        if self.has_alpha:
+            self.bind(shader, "triangle_attributes", "materials")
+            if self.has_images:
+                self.bind(shader, "image_table", "image_texels")
+
+    def bind_surfaces(self, shader) -> None:
+        """Binds what a shader compiled with ``surface_defines`` declares."""
+        self.bind(shader, "bvh_nodes", "triangle_corners", "triangle_attributes", "materials")
+        if self.has_images:
+            self.bind(shader, "image_table", "image_texels")
+
+
+def _attributes(snapshot: SceneSnapshot, order: np.ndarray, material: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """(T, 5, 4) rows of surface_lib's triangle_attributes, in leaf order."""
+    uvs = snapshot.corner_uvs[order].astype(np.float32)
+    rows = np.zeros((len(order), 5, 4), np.float32)
+    rows[:, 0:3, :3] = snapshot.corner_normals[order]
+    rows[:, 0, 3] = material
+    rows[:, 1, 3] = snapshot.object_index[order]
+    rows[:, 2, 3] = _uv_scale(corners, uvs)
+    rows[:, 3] = uvs[:, :2].reshape(-1, 4)
+    rows[:, 4, :2] = uvs[:, 2]
+    return rows
+
+
+def _uv_scale(corners: np.ndarray, uvs: np.ndarray) -> np.ndarray:
+    """(T,) uv units per metre: square root of the ratio of areas."""
+    edge = corners[:, 1:] - corners[:, :1]
+    area = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1)
+    uv_edge = uvs[:, 1:] - uvs[:, :1]
+    uv_area = np.abs(uv_edge[:, 0, 0] * uv_edge[:, 1, 1] - uv_edge[:, 0, 1] * uv_edge[:, 1, 0])
+    return np.sqrt(uv_area / np.maximum(area, 1e-30))
+
+
+def _materials(snapshot: SceneSnapshot) -> np.ndarray:
+    """(M, 3, 4) rows of surface_lib's materials."""
+    rows = np.zeros((max(len(snapshot.materials), 1), 3, 4), np.float32)
+    rows[:, 0] = (0.8, 0.8, 0.8, -1)
+    rows[:, 1:, 3] = rows[:, 2, 2] = -1
+    for row, material in zip(rows, snapshot.materials):
+        row[0] = (*(np.array(material.base_color) * material.diffuse_share), material.base_image)
+        row[1] = (*material.emission, material.emission_image)
+        row[2] = (material.alpha, material.alpha_threshold, material.alpha_image, material.alpha_from_color)
+    return rows
+
+
+def pack_lights(lights: list[Light], origin: np.ndarray) -> np.ndarray:
+    """(lights, 6, 4) rows of direct_light_lib's lights, positions relative to ``origin``."""
+    rows = np.zeros((len(lights), 6, 4), np.float32)
+    for row, light in zip(rows, lights):
+        matrix = np.asarray(light.matrix, float)
+        row[0, :3] = matrix[:3, 3] - origin
+        row[1, :3] = light.color
+        row[2, :3], row[3, :3], row[4, :3] = matrix[:3, 0], matrix[:3, 1], matrix[:3, 2]
+        row[4, 3] = light.casts_shadow
+        if light.kind == "SUN":
+            row[0, 3] = _SUN
+            row[1, 3] = 1 - np.cos(light.angle / 2)
+        elif light.kind == "AREA":
+            row[0, 3] = _ELLIPSE if light.shape == "ELLIPSE" else _RECTANGLE
+            row[2, 3], row[3, 3] = light.size_x, light.size_y
+            if light.spread < np.pi - 1e-4:
+                half = max(light.spread / 2, 1e-3)
+                row[5, :2] = np.tan(half), 1 / (np.tan(half) - half)
+        else:
+            row[0, 3] = _SPOT if light.kind == "SPOT" else _POINT
+            row[1, 3] = light.radius
+            row[5, 2] = light.soft_falloff
+            if light.kind == "SPOT":
+                cosine = np.cos(light.spot_size / 2)
+                row[5, :2] = cosine, 1 / max((1 - cosine) * light.spot_blend, 1e-6)
+    return rows
+
+
+def _pack_images(images: list[Image]) -> tuple[np.ndarray, np.ndarray]:
+    """Table (I, 4) and texels (N, 4): each image starts a row, its mip levels follow one another."""
+    table = np.zeros((len(images), 4), np.float32)
+    parts, row = [], 0
+    for entry, image in zip(table, images):
+        level = np.asarray(image.pixels, np.float32)
+        height, width = level.shape[:2]
+        entry[:] = row, width, height, _EXTENSIONS[image.extension]
+        levels = [level.reshape(-1, 4)]
+        while max(level.shape[:2]) > 1:
+            level = _halve(level)
+            levels.append(level.reshape(-1, 4))
+        texels = np.concatenate(levels)
+        rows = -(-len(texels) // ROW)
+        parts.append(np.pad(texels, ((0, rows * ROW - len(texels)), (0, 0))))
+        row += rows
+    return table, np.minimum(np.concatenate(parts), 65504.0)
+
+
+def _halve(level: np.ndarray) -> np.ndarray:
+    """Next mip level: means over equal parts, sizes halved and rounded down, never below 1."""
+    for axis in (0, 1):
+        size = level.shape[axis]
+        if size > 1:
+            edges = np.arange(size // 2) * size // (size // 2)
+            sums = np.add.reduceat(level, edges, axis=axis)
+            shape = [1, 1, 1]
+            shape[axis] = -1
+            level = sums / np.diff(np.append(edges, size)).reshape(shape)
+    return level.astype(np.float32)

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arrays on the GPU: linear arrays of vec4 in 2D textures, layered images, and reading back."""
+
+from __future__ import annotations
+
+import gpu
+import numpy as np
+
+from ..core.errors import InputError
+
+ROW = 4096  # elements per row: element i sits at (i & 4095, i >> 12), as data_lib.glsl reads it
+
+
+def upload(data: np.ndarray, what: str, pixel: str = "RGBA32F") -> gpu.types.GPUTexture:
+    """Texture of linear array ``data`` (…, 4), converted to float32; at least one element is stored.
+
+    Raises:
+        InputError: more elements than one texture holds; ``what`` names them in the message.
+    """
+    flat = np.asarray(data, np.float32).reshape(-1, 4)
+    rows = _rows(len(flat), what)
+    padded = np.zeros((rows * ROW, 4), np.float32)
+    padded[: len(flat)] = flat
+    buffer = gpu.types.Buffer("FLOAT", padded.size, padded.reshape(-1))
+    return gpu.types.GPUTexture((ROW, rows), format=pixel, data=buffer)
+
+
+def allocate(elements: int, what: str, pixel: str = "RGBA32F") -> gpu.types.GPUTexture:
+    """Linear array of ``elements`` zeros."""
+    texture = gpu.types.GPUTexture((ROW, _rows(elements, what)), format=pixel)
+    texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
+    return texture
+
+
+def layers(width: int, height: int, count: int, pixel: str) -> gpu.types.GPUTexture:
+    """Layered image without defined content."""
+    return gpu.types.GPUTexture((width, height), layers=count, format=pixel)
+
+
+def read(texture: gpu.types.GPUTexture, elements: int, channels: int = 4) -> np.ndarray:
+    """(elements, channels) float32 copy of a linear array. Waits for the GPU."""
+    buffer = texture.read()
+    # Blender 4.5 and 5.0 export wrong strides for buffers of more than one dimension.
+    buffer.dimensions = texture.width * texture.height * channels
+    return np.frombuffer(buffer, np.float32).reshape(-1, channels)[:elements].copy()
+
+
+def _rows(elements: int, what: str) -> int:
+    limit = gpu.capabilities.max_texture_size_get()
+    rows = max(1, -(-elements // ROW))
+    if rows > limit:
+        raise InputError(f"{elements} {what} do not fit the GPU, which holds {limit * ROW}; bake a smaller part of the scene")
+    return rows
