@@ -5,8 +5,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from ..core.errors import InputError
+from ..core.grid import Grid
 from ..core.settings import CAPTURES, BakeSettings
+from ..core.snapshot import Volume
+from ..formats.staging import StagedFolder
 from . import arguments
 
 HELP = "bakes the probe volumes of a .blend, or one fitted to its scene"
@@ -69,3 +74,47 @@ def check(args) -> None:
         raise InputError("--min and --max need --resolution NX,NY,NZ or --spacing M")
     if args.file is not None and not Path(args.file).exists():
         raise InputError(f"{args.file}: no such file")
+
+
+def run(args, reporter, should_stop):
+    import bpy
+
+    from ..scene.open_file import open_blend, set_frame
+    from ..scene.read import read_scene
+    from . import pipeline
+
+    check(args)
+    settings = settings_from(args)
+    stopwatch = pipeline.Stopwatch()
+    with StagedFolder(args.output) as folder:
+        with stopwatch.measure("read"):
+            reporter.phase("read")
+            scene = bpy.context.scene if args.file is None else open_blend(args.file)
+            if args.frame is not None:
+                set_frame(scene, args.frame)
+            snapshot = read_scene(scene)
+        pipeline.check_snapshot(snapshot, reporter)
+        grids = choose_grids(args, snapshot)
+        pipeline.start_gpu(stopwatch)
+        return pipeline.bake_volumes(snapshot, grids, settings, folder, reporter, should_stop, stopwatch)
+
+
+def choose_grids(args, snapshot) -> list[Grid]:
+    """The volumes to bake: from the options, from the file, or one fitted to the scene.
+
+    ``--resolution`` and ``--spacing`` also apply to volumes of the file.
+    """
+    from ..scene.volumes import fit_volume
+
+    if args.min is not None:
+        volumes = [Volume("volume", Grid.from_bounds(args.min, args.max, (1, 1, 1)).matrix, args.resolution or (1, 1, 1))]
+    else:
+        volumes = snapshot.volumes or [fit_volume(snapshot)]
+    grids = []
+    for volume in volumes:
+        resolution = args.resolution or volume.resolution
+        if args.spacing is not None:
+            extent = 2 * np.linalg.norm(volume.matrix[:3, :3], axis=0)
+            resolution = tuple(int(count) for count in np.minimum(np.rint(extent / args.spacing), 10**6) + 1)
+        grids.append(Grid(volume.matrix, resolution, volume.name))
+    return grids

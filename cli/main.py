@@ -99,8 +99,9 @@ def _run(argv: list[str], in_blender: bool, child: bool) -> int:
     reporter = Reporter(quiet=getattr(args, "quiet", False))
     try:
         summary, status = module.run(args, reporter, stop)
-    finally:
         reporter.finish()
+    finally:
+        reporter.abandon()
         if previous is not None:
             signal.signal(signal.SIGINT, previous)
     print(json.dumps(summary, allow_nan=False), flush=True)

@@ -14,8 +14,9 @@ LINE_INTERVAL = 5.0  # seconds between lines where nothing can be redrawn
 class Reporter:
     """Receives what a job says about itself.
 
-    A job calls ``phase`` when a new kind of work starts, ``advance`` as it goes, ``note`` for facts worth reading and ``warn``
-    for what the user should act on. ``quiet`` silences all but warnings. Every warning is kept, once, in ``warnings``.
+    A job calls ``phase`` when a new kind of work starts, ``advance`` as it goes, ``note`` for facts worth reading and
+    ``warn`` for what the user should act on. ``quiet`` silences all but warnings. Every warning is kept, once, in
+    ``warnings``.
     """
 
     def __init__(self, stream=None, quiet: bool = False, clock=time.monotonic):
@@ -65,6 +66,14 @@ class Reporter:
             if not self._quiet:
                 self._line(summary)
             self._name = ""
+
+    def abandon(self) -> None:
+        """Ends the running phase without a word: what follows is an error or the user's own stop."""
+        self._name = ""
+        if self._drawn:
+            self._stream.write("\r" + " " * self._drawn + "\r")
+            self._stream.flush()
+            self._drawn = 0
 
     def _show(self) -> None:
         if self._quiet or not self._name:

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import io
 import json
 import os
 import sys
@@ -53,9 +54,13 @@ def channel_names(bands: int) -> list[str]:
     return names
 
 
+def _pixel_bytes(grid: Grid, bands: int) -> int:
+    return grid.count * len(channel_names(bands)) * 4
+
+
 def check_size(grid: Grid, bands: int) -> None:
     """Raises InputError where a field of ``grid`` is too large for one file; cheap, made before the long work."""
-    size = grid.count * len(channel_names(bands)) * 4
+    size = _pixel_bytes(grid, bands)
     if size > MAX_BYTES:
         raise InputError(f"{grid.name}: {grid.count} probes need {size >> 20} MiB in one probe file, the limit is "
                          f"{MAX_BYTES >> 20} MiB; use a lower resolution, fewer bands or several volumes")
@@ -96,7 +101,7 @@ def write(path, field: Field) -> None:
     with open(path, "wb"):
         pass
     try:
-        with _silent_stderr():
+        with _silent():
             OpenEXR.File(header, dict(zip(names, planes))).write(os.fspath(path))
     except RuntimeError as error:
         raise OSError(None, f"writing failed: {_reason(error)}", str(path)) from None
@@ -120,7 +125,7 @@ def read(path) -> Field:
     if magic != b"\x76\x2f\x31\x01":
         raise InputError(f"{path} is not an OpenEXR file; name a probes.exr that Gridlight wrote")
     try:
-        with _silent_stderr():
+        with _silent():
             document, grid, bands = _check_header(path, OpenEXR.File(path, header_only=True).header())
             channels = OpenEXR.File(path, separate_channels=True).channels()
             planes = _gather(path, channels, grid, bands)
@@ -179,7 +184,9 @@ def _check_header(path: str, header: dict) -> tuple[dict, Grid, int]:
         raise InputError(f"{path} has format version {version[0]}.{version[1]}, this Gridlight reads up to "
                          f"{FORMAT_VERSION[0]}; update Gridlight")
     grid, bands = _announced_grid(path, document)
-    check_size(grid, bands)
+    size = _pixel_bytes(grid, bands)
+    if size > MAX_BYTES:
+        raise InputError(f"{path} announces {size >> 20} MiB of probes, the limit is {MAX_BYTES >> 20} MiB; it is not read")
     low, high = (np.asarray(corner, np.int64) for corner in header["dataWindow"])
     nx, ny, nz = grid.resolution
     if tuple(high - low + 1) != (nx, ny * nz):
@@ -252,19 +259,20 @@ def _reason(error: Exception) -> str:
 
 
 @contextlib.contextmanager
-def _silent_stderr():
-    """OpenEXR prints its errors on descriptor 2 as well as raising them; the user gets one line, ours."""
-    try:
-        sys.stderr.flush()
-        kept = os.dup(2)
-    except (OSError, AttributeError):  # no standard error at all, as in Blender on Windows started without a console
-        yield
-        return
+def _silent():
+    """OpenEXR raises its errors and prints them too, on both standard streams; the user gets one line, ours."""
     null = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, 2)
+    kept = {}
+    for descriptor, stream in ((1, sys.stdout), (2, sys.stderr)):
+        if stream is not None:  # None in Blender on Windows started without a console
+            stream.flush()
+            kept[descriptor] = os.dup(descriptor)
+            os.dup2(null, descriptor)
     os.close(null)
     try:
-        yield
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            yield
     finally:
-        os.dup2(kept, 2)
-        os.close(kept)
+        for descriptor, copy in kept.items():
+            os.dup2(copy, descriptor)
+            os.close(copy)

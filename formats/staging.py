@@ -36,7 +36,8 @@ class StagedFolder:
             probe.unlink()
         except OSError as error:
             self._discard()
-            raise InputError(f"cannot write to the folder {self.folder}: {error.strerror}; name another with -o") from None
+            reason = error.strerror
+            raise InputError(f"cannot write to the folder {self.folder}: {reason}; name another with -o") from None
         return self
 
     def __exit__(self, kind, error, _trace):
@@ -55,6 +56,10 @@ class StagedFolder:
     def path(self, name: str) -> Path:
         """Where to write what will be ``name``."""
         self._staged[name] = self._temporary(name)
+        return self._staged[name]
+
+    def staged(self, name: str) -> Path:
+        """The temporary path of ``name``, which has been written already."""
         return self._staged[name]
 
     @property

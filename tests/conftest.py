@@ -13,7 +13,8 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def _load_package():
-    spec = importlib.util.spec_from_file_location("gridlight", ROOT / "__init__.py", submodule_search_locations=[str(ROOT)])
+    spec = importlib.util.spec_from_file_location(
+        "gridlight", ROOT / "__init__.py", submodule_search_locations=[str(ROOT)])
     package = importlib.util.module_from_spec(spec)
     sys.modules["gridlight"] = package
     spec.loader.exec_module(package)
@@ -50,7 +51,8 @@ def run_gridlight():
 
     def run(*arguments, **options):
         options = {"capture_output": True, "text": True, "timeout": 600, **options}
-        return subprocess.run([sys.executable, "-I", str(ROOT / "cli" / "__main__.py"), *map(str, arguments)], check=False, **options)
+        command = [sys.executable, "-I", str(ROOT / "cli" / "__main__.py"), *map(str, arguments)]
+        return subprocess.run(command, check=False, **options)
 
     return run
 
@@ -65,9 +67,11 @@ def gpu_context():
         "start = importlib.util.module_from_spec(spec); spec.loader.exec_module(start); start.load_package()\n"
         "from gridlight.gpu_shaders.context import ensure_context\n"
         "ensure_context(); sys.stdout.flush(); os._exit(0)\n")
-    attempt = subprocess.run([sys.executable, "-I", "-c", program], capture_output=True, text=True, timeout=120, check=False)
+    command = [sys.executable, "-I", "-c", program]
+    attempt = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     if attempt.returncode != 0:
-        pytest.fail(f"no GPU context: a Blender process that made one ended with {attempt.returncode}\n{attempt.stdout}{attempt.stderr}")
+        pytest.fail(f"no GPU context: a Blender process that made one ended with {attempt.returncode}\n"
+                    f"{attempt.stdout}{attempt.stderr}")
     from gridlight.gpu_shaders.context import ensure_context
 
     ensure_context()
