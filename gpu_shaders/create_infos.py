@@ -64,7 +64,7 @@ def capture_raster(info, defines):
 
     slot = _scene(info, defines, attributes=False)
     _samplers(info, "probe_slots", "instances", first=slot)
-    _ints(info, "first_slot", "first_instance", "triangle_count")
+    _ints(info, "first_slot", "triangle_count")
     info.push_constant("FLOAT", "near_distance")
     info.push_constant("FLOAT", "far_distance")
     stage = GPUStageInterfaceInfo("capture_raster_iface")
@@ -72,7 +72,7 @@ def capture_raster(info, defines):
     stage.smooth("VEC2", "hit_barycentric")
     stage.smooth("VEC3", "hit_offset")
     info.vertex_out(stage)
-    info.vertex_in(0, "FLOAT", "unused")
+    info.vertex_in(0, "FLOAT", "vertex_number")
     info.depth_write("ANY")
     info.fragment_out(0, "VEC4", "hit")
     return {"vertex": ["data_lib", "cubemap_lib", "capture_raster_vert"],
@@ -85,7 +85,7 @@ def surface_resolve_comp(info, defines):
     slot = _samplers(info, "probe_slots", "world_texels", first=slot)
     _samplers(info, "hits", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "geometry", layered=True)
-    _image(info, 1, "albedo", layered=True, pixel="RGBA16F")
+    _image(info, 1, "albedo", layered=True)
     _image(info, 2, "emission", layered=True)
     _ints(info, "first_slot", "first_layer")
     info.local_group_size(8, 8, 1)

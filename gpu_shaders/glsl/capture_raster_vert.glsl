@@ -6,13 +6,14 @@
 
 void main()
 {
-  vec4 pair = element(instances, first_instance + gl_InstanceID);
+  vec4 pair = element(instances, gl_InstanceID);
   int cluster = int(pair.x);
   int layer = int(pair.y);
+  int vertex = int(vertex_number);
   int probe = layer / 6;
   int face = layer - probe * 6;
-  int index = min(cluster * CLUSTER_SIZE + gl_VertexID / 3, triangle_count - 1);
-  int corner = gl_VertexID - gl_VertexID / 3 * 3;
+  int index = min(cluster * CLUSTER_SIZE + vertex / 3, triangle_count - 1);
+  int corner = vertex - vertex / 3 * 3;
   vec3 position = element(triangle_corners, 3 * index + corner).xyz - element(probe_slots, first_slot + probe).xyz;
 
   vec3 forward = face_direction(face, vec2(0.0));

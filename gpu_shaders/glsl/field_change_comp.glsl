@@ -8,10 +8,10 @@ SHARED_ vec4 partial_sums[256];
 
 void main()
 {
-  int thread = int(gl_LocalInvocationID.x);
+  int lane = int(gl_LocalInvocationID.x);
   vec4 sum = vec4(0.0);
   int total = slot_count * COEFFICIENTS;
-  for (int i = thread; i < total; i += 256) {
+  for (int i = lane; i < total; i += 256) {
     int slot = i / COEFFICIENTS;
     int c = i - slot * COEFFICIENTS;
     int at = int(element(probe_slots, slot).w) * COEFFICIENTS + c;
@@ -19,15 +19,15 @@ void main()
     vec3 change = fresh - element(field_old, at).rgb;
     sum += vec4(dot(fresh, fresh), dot(change, change), 0.0, c == 0 ? dot(fresh, vec3(0.2126, 0.7152, 0.0722)) : 0.0);
   }
-  partial_sums[thread] = sum;
+  partial_sums[lane] = sum;
   barrier();
   for (int half_count = 128; half_count > 0; half_count /= 2) {
-    if (thread < half_count) {
-      partial_sums[thread] += partial_sums[thread + half_count];
+    if (lane < half_count) {
+      partial_sums[lane] += partial_sums[lane + half_count];
     }
     barrier();
   }
-  if (thread == 0) {
+  if (lane == 0) {
     imageStore(change, ivec2(0), partial_sums[0]);
   }
 }

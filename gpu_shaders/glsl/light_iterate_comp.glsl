@@ -10,13 +10,13 @@ SHARED_ vec4 partial_sums[COEFFICIENTS * GROUP];
 void main()
 {
   int probe = int(gl_WorkGroupID.x);
-  int thread = int(gl_LocalInvocationID.x);
+  int lane = int(gl_LocalInvocationID.x);
   int layer = first_layer + probe;
   vec3 sum[COEFFICIENTS];
   for (int c = 0; c < COEFFICIENTS; c++) {
     sum[c] = vec3(0.0);
   }
-  for (int i = thread; i < 6 * FACE * FACE; i += GROUP) {
+  for (int i = lane; i < 6 * FACE * FACE; i += GROUP) {
     ivec3 at = ivec3(i % FACE, i / FACE, layer);
     vec3 radiance = texelFetch(source, at, 0).rgb;
     if (read_field != 0) {
@@ -38,10 +38,10 @@ void main()
     }
   }
   for (int c = 0; c < COEFFICIENTS; c++) {
-    partial_sums[c * GROUP + thread] = vec4(sum[c], 0.0);
+    partial_sums[c * GROUP + lane] = vec4(sum[c], 0.0);
   }
   barrier();
-  for (int c = thread; c < COEFFICIENTS; c += GROUP) {
+  for (int c = lane; c < COEFFICIENTS; c += GROUP) {
     vec3 total = vec3(0.0);
     for (int i = 0; i < GROUP; i++) {
       total += partial_sums[c * GROUP + i].rgb;

@@ -6,10 +6,10 @@
 void main()
 {
   int probe = int(gl_WorkGroupID.x);
-  int thread = int(gl_LocalInvocationID.x);
+  int lane = int(gl_LocalInvocationID.x);
   vec4 sighting = vec4(0.0);
   for (int i = 0; i < 4; i++) {
-    int sample_index = thread * 4 + i;
+    int sample_index = lane * 4 + i;
     ivec2 cell = ivec2(sample_index & 7, (sample_index >> 3) & 7);
     int face = sample_index >> 6;
     ivec2 texel = (2 * cell + 1) * FACE / 16;
@@ -18,5 +18,5 @@ void main()
       sighting[i] = seen.z < 0.0 ? -1.0 - seen.w : 1.0 + seen.w;
     }
   }
-  imageStore(sightings, ivec2((probe * 96 + thread) & 4095, (probe * 96 + thread) >> 12), sighting);
+  imageStore(sightings, ivec2((probe * 96 + lane) & 4095, (probe * 96 + lane) >> 12), sighting);
 }

@@ -11,11 +11,11 @@ SHARED_ vec2 partial_shares[64];
 void main()
 {
   int probe = int(gl_WorkGroupID.x);
-  int thread = int(gl_LocalInvocationID.x);
+  int lane = int(gl_LocalInvocationID.x);
   int slot = first_slot + probe;
   int layer = first_layer + probe;
 
-  vec2 texel = vec2(thread % DEPTH_EDGE, thread / DEPTH_EDGE);
+  vec2 texel = vec2(lane % DEPTH_EDGE, lane / DEPTH_EDGE);
   vec2 moments = vec2(0.0);
   for (int i = 0; i < 16; i++) {
     vec2 place = texel + 0.5 + (vec2(i & 3, i >> 2) - 1.5) * 0.375;
@@ -32,10 +32,10 @@ void main()
     range = min(range, depth_clamp);
     moments += vec2(range, range * range);
   }
-  imageStore(depth_moments, element_position(slot * DEPTH_EDGE * DEPTH_EDGE + thread), vec4(moments / 16.0, 0.0, 0.0));
+  imageStore(depth_moments, element_position(slot * DEPTH_EDGE * DEPTH_EDGE + lane), vec4(moments / 16.0, 0.0, 0.0));
 
   vec2 share = vec2(0.0);
-  for (int i = thread; i < 6 * FACE * FACE; i += 64) {
+  for (int i = lane; i < 6 * FACE * FACE; i += 64) {
     ivec2 at = ivec2(i % FACE, i / FACE);
     vec2 seen = texelFetch(geometry, ivec3(at, layer), 0).zw;
     float weight = element(texel_weights, (at.y % FACE) * FACE + at.x).x;
@@ -46,9 +46,9 @@ void main()
       share.x += weight;
     }
   }
-  partial_shares[thread] = share;
+  partial_shares[lane] = share;
   barrier();
-  if (thread == 0) {
+  if (lane == 0) {
     vec2 sum = vec2(0.0);
     for (int i = 0; i < 64; i++) {
       sum += partial_shares[i];

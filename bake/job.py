@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The bake from a scene snapshot to a field.
+
+``bake_steps`` is the whole job as a generator that yields between pieces of GPU work: ``run_bake`` drives it to the end, a timer can drive it
+step by step. Cancelling is not calling ``next`` again.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from dataclasses import field as default
+from typing import Protocol
+
+import numpy as np
+
+from ..core import culling, dilation
+from ..core.conventions import ACTIVE, CULLED, DEPTH_EDGE, INVALID
+from ..core.errors import Cancelled, InputError
+from ..core.field import Field
+from ..core.grid import Grid
+from ..core.orientation import flipped_objects
+from ..core.settings import BakeSettings
+from ..core.snapshot import SceneSnapshot
+from ..gpu_shaders.backend import GpuBackend, Surfaces
+from .capture_choice import choose_capture
+from .convergence import Convergence
+
+_VOTERS = 512  # probes that decide which objects are inside out
+_INVALID_SHARE = 0.5  # of the sphere showing back faces
+
+
+class Reporter(Protocol):
+    """Where a bake tells how far it is."""
+
+    def phase(self, name: str, total: int | None = None) -> None: ...
+
+    def advance(self, amount: int = 1) -> None: ...
+
+    def note(self, text: str) -> None: ...
+
+    def warn(self, text: str) -> None: ...
+
+
+@dataclass
+class BakeResult:
+    """What a bake produced. ``seconds`` by phase; ``energy`` per iteration: mean luminance of band 0 over active probes."""
+
+    field: Field | None = None
+    iterations: int = 0
+    converged: bool = False
+    energy: list[float] = default(default_factory=list)
+    change: list[float] = default(default_factory=list)
+    seconds: dict[str, float] = default(default_factory=dict)
+    counts: dict[str, int] = default(default_factory=dict)
+    capture: str = ""
+    notes: list[str] = default(default_factory=list)
+    warnings: list[str] = default(default_factory=list)
+
+
+def run_bake(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, reporter: Reporter,
+             should_stop: Callable[[], bool]) -> BakeResult:
+    """Bakes ``snapshot`` into ``grid``. Needs a GPU context.
+
+    Raises:
+        InputError: the scene has no surface, or the grid does not fit the GPU.
+        Cancelled: ``should_stop`` returned true between two steps.
+    """
+    result = BakeResult()
+    for _ in bake_steps(snapshot, grid, settings, reporter, result):
+        if should_stop():
+            raise Cancelled("cancelled; nothing was written")
+    return result
+
+
+def bake_steps(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, reporter: Reporter,
+               result: BakeResult) -> Iterator[None]:
+    """The bake in steps; fills ``result`` as it goes and completes it with the last step."""
+    if not len(snapshot.triangles):
+        raise InputError(f"scene '{snapshot.name}' has no surface that renders; add or unhide a mesh")
+    _warn_about_light(snapshot, result)
+
+    with _timed(result, "cull"):
+        reporter.phase("cull")
+        state = _cull(snapshot, grid, settings, result)
+    yield
+
+    with _timed(result, "setup"):
+        reporter.phase("upload")
+        backend = GpuBackend(snapshot, grid, settings)
+        nodes = np.flatnonzero(state == ACTIVE)
+        positions = grid.positions()[nodes]
+    yield
+    with _timed(result, "capture"):
+        result.capture, reason = choose_capture(settings, backend.scene.triangle_count)
+        result.notes.append(reason)
+        _vote_on_orientation(backend, nodes, positions, result)
+        backend.set_probes(nodes, positions)
+        backend.allocate_field()
+    yield
+
+    batches = _Batches(backend, len(nodes), result.capture)
+    if not batches.resident:
+        result.notes.append(f"texel surfaces of {len(nodes)} probes exceed the memory budget of {settings.memory_mib} MiB: "
+                            "they are captured again in every iteration")
+    reporter.phase("capture", len(nodes))
+    for index in range(batches.count):
+        with _timed(result, "capture"):
+            surfaces = batches.captured(index)
+            backend.statistics(surfaces)
+            reporter.advance(surfaces.count)
+        yield
+    with _timed(result, "capture"):
+        shares = backend.read_shares()
+        state[nodes[shares[:, 0] > _INVALID_SHARE]] = INVALID
+        if not (state == ACTIVE).any():
+            raise InputError(f"{grid.name}: every probe sits inside solid geometry; move or enlarge the volume")
+        backend.set_states(state)
+
+    reporter.phase("light")
+    convergence = Convergence(settings.bounces, settings.tolerance)
+    while True:
+        for index in range(batches.count):
+            with _timed(result, "light"):
+                backend.iterate(batches.lit(index), read_field=convergence.iterations > 0)
+            yield
+        with _timed(result, "light"):
+            energy, change, band0 = backend.finish_iteration()
+            result.energy.append(band0 / max(len(nodes), 1) * 0.28209479177387814)
+            factor = convergence.add(energy, change)
+            reporter.advance(1)
+            if convergence.done:
+                break
+            if factor:
+                backend.extrapolate(factor)
+        yield
+
+    with _timed(result, "light"):
+        result.iterations = convergence.iterations
+        result.converged = convergence.converged
+        result.change = convergence.changes
+        result.notes.append(convergence.reason)
+        result.field = _finish(backend, grid, settings, state, nodes, shares)
+    result.counts = {"total": grid.count, "active": int((state == ACTIVE).sum()), "culled": int((state == CULLED).sum()),
+                     "invalid": int((state == INVALID).sum())}
+    if not np.isfinite(result.field.coefficients).all():
+        raise InputError(f"scene '{snapshot.name}' sends light that is not finite; look for lights or emission beyond 1e30")
+
+
+class _Batches:
+    """Texel surfaces of all active probes in batches, kept while they fit the budget and captured again where not."""
+
+    def __init__(self, backend: GpuBackend, slots: int, method: str):
+        self._backend = backend
+        self._method = method
+        self._slots = slots
+        self.resident = slots <= backend.probes_in_budget
+        self._size = min(backend.probes_per_batch, slots)
+        self.count = -(-slots // self._size)
+        self._kept: dict[int, Surfaces] = {}
+        self._lit: set[int] = set()
+
+    def captured(self, index: int) -> Surfaces:
+        """Batch ``index`` with geometry, albedo and emission."""
+        if self.resident and index in self._kept:
+            return self._kept[index]
+        first = index * self._size
+        if not self.resident:
+            self._kept.clear()  # frees the images of the batch before
+        surfaces = self._kept[index] = self._backend.surfaces(first, min(self._size, self._slots - first))
+        self._backend.capture(surfaces, self._method)
+        return surfaces
+
+    def lit(self, index: int) -> Surfaces:
+        """Batch ``index`` with direct light and lookup weights too."""
+        if self.resident and index in self._lit:
+            return self._kept[index]
+        surfaces = self.captured(index)
+        self._backend.weigh_lookups(surfaces)
+        self._backend.direct_light(surfaces)
+        self._lit.add(index)
+        return surfaces
+
+
+def _cull(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, result: BakeResult) -> np.ndarray:
+    """(P,) uint8 states before capture: ACTIVE or CULLED."""
+    if settings.keep_all:
+        return np.full(grid.count, ACTIVE, np.uint8)
+    needed = culling.needed_nodes(grid, snapshot.triangle_positions)
+    return np.where(needed, ACTIVE, CULLED).astype(np.uint8)
+
+
+def _vote_on_orientation(backend: GpuBackend, nodes: np.ndarray, positions: np.ndarray, result: BakeResult) -> None:
+    """Lets probes spread over the grid decide which objects have their normals the wrong way round."""
+    voters = np.unique(np.linspace(0, len(nodes) - 1, min(_VOTERS, len(nodes))).astype(int))
+    voters = voters[: backend.probes_per_batch]
+    backend.set_probes(nodes[voters], positions[voters])
+    surfaces = backend.surfaces(0, len(voters))
+    backend.capture(surfaces, result.capture)
+    flips = flipped_objects(backend.sightings(surfaces), backend.object_count)
+    backend.set_flips(flips)
+    if flips.any():
+        result.notes.append(f"{int(flips.sum())} objects are seen mostly from behind; their normals count as flipped")
+
+
+def _finish(backend: GpuBackend, grid: Grid, settings: BakeSettings, state: np.ndarray, nodes: np.ndarray,
+            shares: np.ndarray) -> Field:
+    """Reads the field back and completes it for probes without light of their own."""
+    baked = Field.empty(grid, settings.bands)
+    baked.state[:] = state
+    baked.validity[nodes] = 1.0 - shares[:, 0]
+    baked.coefficients = dilation.fill(grid, backend.read_field(), state == ACTIVE)
+    baked.depth[nodes] = backend.read_depth()
+    return baked
+
+
+def _warn_about_light(snapshot: SceneSnapshot, result: BakeResult) -> None:
+    emits = any(max(m.emission) > 0 for m in snapshot.materials)
+    world = snapshot.world.map is not None or max(snapshot.world.color) > 0
+    if not (snapshot.lights or emits or world):
+        result.warnings.append(f"scene '{snapshot.name}' has no light: no lamp, emission or world; the field is black. Add a light or "
+                               "enable its rendering")
+
+
+@contextmanager
+def _timed(result: BakeResult, phase: str):
+    """Adds the time of a step to its phase. GPU work is counted where the program waits for it."""
+    start = time.perf_counter()
+    yield
+    result.seconds[phase] = result.seconds.get(phase, 0.0) + time.perf_counter() - start
