@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Evaluated meshes and their instances as world-space triangles.
+
+Every mesh datablock is read once, whatever the number of its instances, in its own space and with bulk reads only; instances
+are transformed together in float64.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+# A triangle thinner than this share of its longest edge has no area that light could fall on.
+_NEEDLE = 1e-7
+
+
+@dataclass
+class MeshArrays:
+    """One mesh in its own space, triangulated. V vertices, T triangles."""
+
+    vertices: np.ndarray  # (V, 3) float64
+    triangles: np.ndarray  # (T, 3) int32
+    corner_normals: np.ndarray  # (T, 3, 3) float32
+    slots: np.ndarray  # (T,) int32 material slot
+    uv_maps: dict[str, np.ndarray]  # name -> (T, 3, 2) float32
+    active_uv_map: str  # "" where the mesh has none
+    not_finite: int = 0  # triangles dropped because a corner is NaN or infinite
+    needles: int = 0  # triangles dropped because they have no area
+
+
+@dataclass
+class WorldTriangles:
+    """The arrays of ``SceneSnapshot`` that describe one group of instances; I instances of one mesh."""
+
+    vertices: np.ndarray  # (I·V, 3) float64
+    triangles: np.ndarray  # (I·T, 3) int32
+    corner_normals: np.ndarray  # (I·T, 3, 3) float32
+    corner_uvs: np.ndarray  # (I·T, 3, 2) float32
+
+
+def read_mesh(mesh: bpy.types.Mesh) -> MeshArrays:
+    """Read an evaluated mesh. Triangles without area and those with a corner that is not finite are dropped and counted."""
+    vertices = _read(mesh.attributes["position"].data, "vector", (len(mesh.vertices), 3), np.float32) if mesh.vertices \
+        else np.empty((0, 3), np.float32)
+    corner_vertices = _read(mesh.attributes[".corner_vert"].data, "value", (len(mesh.loops),), np.int32) if mesh.loops \
+        else np.empty(0, np.int32)
+    corners, faces = _triangulation(mesh)
+    arrays = MeshArrays(
+        vertices=vertices.astype(float),
+        triangles=corner_vertices[corners],
+        corner_normals=_corner_normals(mesh, corner_vertices, corners, faces),
+        slots=_material_slots(mesh, faces),
+        uv_maps={layer.name: _uv_map(mesh, layer.name)[corners] for layer in mesh.uv_layers},
+        active_uv_map=next((layer.name for layer in mesh.uv_layers if layer.active_render), ""),
+    )
+    _drop_unusable(arrays)
+    return arrays
+
+
+def place(mesh: MeshArrays, corner_uvs: np.ndarray, matrices: np.ndarray) -> WorldTriangles:
+    """Put instances of ``mesh`` into the world; ``matrices`` is (I, 4, 4) float64, ``corner_uvs`` (T, 3, 2) float32.
+
+    Mirroring transforms reverse the winding, so that triangles stay counter-clockwise from their front; normals go through the
+    inverse transpose, written with cofactors because that also holds for flattening transforms.
+    """
+    count, (vertex_count, triangle_count) = len(matrices), (len(mesh.vertices), len(mesh.triangles))
+    axes = matrices[:, :3, :3]
+    vertices = mesh.vertices @ axes.transpose(0, 2, 1) + matrices[:, None, :3, 3]
+    mirrored = np.linalg.det(axes) < 0
+    cofactors = np.cross(axes[:, :, [1, 2, 0]], axes[:, :, [2, 0, 1]], axis=1)  # columns b×c, c×a, a×b
+    cofactors *= np.where(mirrored, -1.0, 1.0)[:, None, None]
+    # Scaled so that millimetre and kilometre scales stay within float32 before they are normalised.
+    largest = np.abs(cofactors).max(axis=(1, 2), keepdims=True)
+    cofactors /= np.where(largest > 0, largest, 1.0)
+    normals = mesh.corner_normals.reshape(-1, 3) @ cofactors.transpose(0, 2, 1).astype(np.float32)
+    normals = normals.reshape(count, triangle_count, 3, 3)
+
+    triangles = np.repeat(mesh.triangles[None], count, axis=0)
+    triangles[mirrored] = triangles[mirrored][:, :, [0, 2, 1]]
+    normals[mirrored] = normals[mirrored][:, :, [0, 2, 1]]
+    uvs = np.repeat(corner_uvs[None], count, axis=0)
+    uvs[mirrored] = uvs[mirrored][:, :, [0, 2, 1]]
+    triangles += (np.arange(count, dtype=np.int32) * vertex_count)[:, None, None]
+    world = WorldTriangles(vertices.reshape(-1, 3), triangles.reshape(-1, 3), normals.reshape(-1, 3, 3),
+                           uvs.reshape(-1, 3, 2))
+    _normalise(world)
+    return world
+
+
+def _read(collection, attribute: str, shape: tuple[int, ...], dtype) -> np.ndarray:
+    values = np.empty(int(np.prod(shape)), dtype)
+    collection.foreach_get(attribute, values)
+    return values.reshape(shape)
+
+
+def _triangulation(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """((T, 3) int32 corners, (T,) int32 faces) of all triangles."""
+    face_count = len(mesh.polygons)
+    if len(mesh.loops) == 3 * face_count:  # triangles already, so there is nothing to ask Blender for
+        return np.arange(3 * face_count, dtype=np.int32).reshape(-1, 3), np.arange(face_count, dtype=np.int32)
+    mesh.calc_loop_triangles()
+    count = len(mesh.loop_triangles)
+    corners = _read(mesh.loop_triangles, "loops", (count, 3), np.int32)
+    faces = _read(mesh.loop_triangle_polygons, "value", (count,), np.int32)
+    return corners, faces
+
+
+def _corner_normals(mesh: bpy.types.Mesh, corner_vertices, corners, faces) -> np.ndarray:
+    """(T, 3, 3) float32, read in the cheapest domain that holds them all."""
+    if not len(corners):
+        return np.empty((0, 3, 3), np.float32)
+    if mesh.normals_domain == "POINT":
+        normals = _read(mesh.vertex_normals, "vector", (len(mesh.vertices), 3), np.float32)
+        return normals[corner_vertices[corners]]
+    if mesh.normals_domain == "FACE":
+        normals = _read(mesh.polygon_normals, "vector", (len(mesh.polygons), 3), np.float32)
+        return np.repeat(normals[faces][:, None], 3, axis=1)
+    return _read(mesh.corner_normals, "vector", (len(mesh.loops), 3), np.float32)[corners]
+
+
+def _material_slots(mesh: bpy.types.Mesh, faces: np.ndarray) -> np.ndarray:
+    attribute = mesh.attributes.get("material_index")  # absent while every face uses the first slot
+    if attribute is None or attribute.domain != "FACE" or attribute.data_type != "INT":
+        return np.zeros(len(faces), np.int32)
+    return _read(attribute.data, "value", (len(mesh.polygons),), np.int32)[faces]
+
+
+def _uv_map(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
+    uvs = _read(mesh.attributes[name].data, "vector", (len(mesh.loops), 2), np.float32)
+    return np.nan_to_num(uvs, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
+
+
+def _drop_unusable(mesh: MeshArrays) -> None:
+    """Remove triangles that are not finite or have no area, and the vertices that are not finite."""
+    finite = np.isfinite(mesh.vertices).all(axis=1)
+    keep = np.ones(len(mesh.triangles), bool)
+    if not finite.all():
+        keep = finite[mesh.triangles].all(axis=1)
+        mesh.not_finite = int(len(keep) - keep.sum())
+    usable = keep.copy()
+    usable[keep] = _has_area(mesh.vertices, mesh.triangles[keep])
+    mesh.needles = int(keep.sum() - usable.sum())
+    if not usable.all():
+        mesh.triangles, mesh.slots = mesh.triangles[usable], mesh.slots[usable]
+        mesh.corner_normals = mesh.corner_normals[usable]
+        mesh.uv_maps = {name: uvs[usable] for name, uvs in mesh.uv_maps.items()}
+    if not finite.all():
+        mesh.triangles = (np.cumsum(finite, dtype=np.int32) - 1)[mesh.triangles]
+        mesh.vertices = mesh.vertices[finite]
+
+
+def _has_area(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(T,) bool."""
+    a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
+    ab, ac, bc = b - a, c - a, c - b
+    doubled_area = np.linalg.norm(_cross(ab, ac), axis=1)
+    longest = np.maximum(np.maximum((ab * ab).sum(1), (ac * ac).sum(1)), (bc * bc).sum(1))
+    return doubled_area > _NEEDLE * longest
+
+
+def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Row-wise cross product; several times faster than numpy's on a million rows."""
+    return np.stack([u[:, 1] * v[:, 2] - u[:, 2] * v[:, 1],
+                     u[:, 2] * v[:, 0] - u[:, 0] * v[:, 2],
+                     u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]], axis=1)
+
+
+def _normalise(world: WorldTriangles) -> None:
+    """Give corner normals unit length; where there is none, the triangle's own normal stands in."""
+    lengths = np.sqrt(np.einsum("tci,tci->tc", world.corner_normals, world.corner_normals))
+    missing = ~((lengths > 1e-12) & np.isfinite(lengths))
+    if missing.any():
+        rows = np.flatnonzero(missing.any(axis=1))
+        a, b, c = (world.vertices[world.triangles[rows, corner]] for corner in range(3))
+        normals = _cross(b - a, c - a)
+        sizes = np.linalg.norm(normals, axis=1, keepdims=True)
+        normals = np.where(sizes > 0, normals / np.where(sizes > 0, sizes, 1), [0.0, 0.0, 1.0]).astype(np.float32)
+        world.corner_normals[missing] = np.repeat(normals[:, None], 3, axis=1)[missing[rows]]
+        lengths = np.where(missing, np.float32(1), lengths)
+    world.corner_normals /= lengths[..., None]

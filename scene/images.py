@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Image datablocks as linear pixels, read once each and no larger than light transport can resolve."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ..core.snapshot import Image
+from .notices import Notices
+
+# A probe's texel sees a patch of surface, never a single pixel of a large texture: images are box-filtered down to this edge.
+MAX_EDGE = 1024
+
+_CHUNK_ROWS = 256  # rows converted at a time, so that an 8192² texture does not need its float copies all at once
+
+_ENCODED = np.arange(256) / 255.0
+_SRGB_TO_LINEAR = np.where(_ENCODED <= 0.04045, _ENCODED / 12.92, ((_ENCODED + 0.055) / 1.055) ** 2.4).astype(np.float32)
+_BYTE_TO_LINEAR = _ENCODED.astype(np.float32)
+
+
+class ImageTable:
+    """Reads images and collects those that materials use, in the order of ``SceneSnapshot.images``."""
+
+    def __init__(self, notices: Notices):
+        self.images: list[Image] = []
+        self._notices = notices
+        self._pixels: dict[int, np.ndarray | None] = {}
+        self._channels: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self._whole: dict[int, np.ndarray] = {}
+        self._indices: dict[tuple[int, str], int] = {}
+
+    def pixels(self, image: bpy.types.Image, user: str) -> np.ndarray | None:
+        """(height, width, 4) float32 linear RGB (not premultiplied) and alpha; None, and a warning, where there are none.
+
+        ``user`` names in the warning what wants the image, such as ``material 'Floor'``.
+        """
+        key = image.as_pointer()
+        if key not in self._pixels:
+            self._pixels[key] = self._read(image, user)
+        return self._pixels[key]
+
+    def channels(self, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(height, width, 3) and (height, width, 1) views of ``pixels``, the same two objects every time."""
+        key = id(pixels)
+        if key not in self._channels:
+            self._channels[key] = pixels[..., :3], pixels[..., 3:]
+            for view in self._channels[key]:
+                self._whole[id(view)] = pixels
+        return self._channels[key]
+
+    def whole(self, view: np.ndarray) -> np.ndarray | None:
+        """The array of which ``view`` came from ``channels``, or None for pixels that were computed."""
+        return self._whole.get(id(view))
+
+    def add(self, name: str, pixels: np.ndarray, extension: str) -> int:
+        """Index of ``pixels`` among the snapshot's images; the same array with the same extension is stored once."""
+        key = (id(pixels), extension)  # the array is kept alive by the Image that holds it
+        if key not in self._indices:
+            self._indices[key] = len(self.images)
+            self.images.append(Image(name, pixels, extension))
+        return self._indices[key]
+
+    def _read(self, image: bpy.types.Image, user: str) -> np.ndarray | None:
+        if image.source == "TILED":
+            self._notices.append(f"image '{image.name}' is tiled (UDIM): only its first tile is used")
+        elif image.source in ("MOVIE", "SEQUENCE"):
+            self._notices.append(f"image '{image.name}' is a {image.source.lower()}: only its current frame is used")
+        width, height = image.size  # asking for the size makes Blender load the file
+        if not (width and height and image.has_data):
+            self._notices.append(f"image '{image.name}' of {user} is missing: the socket's own value is used instead; "
+                                  "find it with File > External Data or pack it into the file")
+            return None
+        encoded = np.empty((height, width, image.channels), np.float32)
+        image.pixels.foreach_get(encoded.ravel())
+        table = self._decoding(image)
+        columns = min(width, max(1, round(width * min(1.0, MAX_EDGE / max(width, height)))))
+        rows = min(height, max(1, round(height * min(1.0, MAX_EDGE / max(width, height)))))
+        bands = []
+        for start in range(0, height, _CHUNK_ROWS):
+            band = _to_rgba(encoded[start:start + _CHUNK_ROWS], table, image)
+            band[..., :3] *= band[..., 3:]  # filtered premultiplied: holes do not stain their rims
+            bands.append(_box_filter(band, columns, axis=1))
+        pixels = _box_filter(np.concatenate(bands), rows, axis=0)
+        alpha = pixels[..., 3:]
+        np.divide(pixels[..., :3], alpha, out=pixels[..., :3], where=alpha > 0)
+        return np.nan_to_num(pixels, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
+
+    def _decoding(self, image: bpy.types.Image) -> np.ndarray | None:
+        """Table from byte to linear value, or None where Blender hands out linear values already."""
+        if image.is_float:
+            return None
+        space = image.colorspace_settings
+        if space.is_data or space.name.startswith(("Linear", "scene_linear", "ACEScg")):
+            return _BYTE_TO_LINEAR
+        if space.name != "sRGB":
+            self._notices.append(f"image '{image.name}' has colour space '{space.name}': it is read as sRGB")
+        return _SRGB_TO_LINEAR
+
+
+def _to_rgba(encoded: np.ndarray, table: np.ndarray | None, image: bpy.types.Image) -> np.ndarray:
+    """(rows, width, channels) as Blender stores them to linear straight RGBA."""
+    rgba = np.ones((*encoded.shape[:2], 4), np.float32)
+    colors = min(encoded.shape[2], 3)
+    source = encoded[..., :colors] if colors == 3 else encoded[..., :1]
+    rgba[..., :3] = source if table is None else table[np.rint(np.clip(source, 0, 1) * 255).astype(np.uint8)]
+    if encoded.shape[2] == 4 and image.alpha_mode != "NONE":
+        rgba[..., 3] = encoded[..., 3]
+        if table is None and image.alpha_mode != "CHANNEL_PACKED":  # float images are stored premultiplied
+            alpha = rgba[..., 3:]
+            np.divide(rgba[..., :3], alpha, out=rgba[..., :3], where=alpha > 0)
+    return rgba
+
+
+def _box_filter(pixels: np.ndarray, size: int, axis: int) -> np.ndarray:
+    """Exact area average along ``axis`` down to ``size`` samples; fractional edges take their share."""
+    length = pixels.shape[axis]
+    if size >= length:
+        return pixels
+    sums = np.cumsum(pixels, axis=axis, dtype=np.float64)
+    sums = np.concatenate([np.zeros_like(np.take(sums, [0], axis)), sums], axis)
+    edges = np.linspace(0, length, size + 1)
+    whole = np.minimum(edges.astype(int), length - 1)
+    shape = [1] * pixels.ndim
+    shape[axis] = -1
+    at_edges = np.take(sums, whole, axis) + (edges - whole).reshape(shape) * np.take(pixels, whole, axis)
+    return (np.diff(at_edges, axis=axis) * (size / length)).astype(np.float32)

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light objects to ``core.snapshot.Light``, in its units.
+
+Factors as Cycles applies them: colour × temperature tint × 2^exposure × power, then per type. Nodes of a light multiply on top.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ..core.snapshot import Light
+from .images import ImageTable
+from .node_links import active_output, find_socket
+from .notices import Notices
+from .shader_nodes import NodeEvaluator
+from .surface_shaders import evaluate_shader
+
+ROLE_PROPERTY, GROUP_PROPERTY = "gridlight_role", "gridlight_group"
+
+
+class LightTable:
+    """Collects lights; every instance of a light object is a light of its own."""
+
+    def __init__(self, images: ImageTable, notices: Notices):
+        self.lights: list[Light] = []
+        self._images = images
+        self._notices = notices
+
+    def add(self, item: bpy.types.Object, matrix: np.ndarray, name: str) -> None:
+        """Add light object ``item`` placed by ``matrix`` (4, 4) float64, which for instances differs from its own.
+
+        Lights that add nothing to diffuse light are passed over: portals, those without power, those invisible to diffuse rays.
+        """
+        light = _read_light(item, matrix, name, self._node_tint(item.data), self._notices)
+        if light is not None:
+            self.lights.append(light)
+
+    def _node_tint(self, data: bpy.types.Light) -> np.ndarray:
+        """(3,) factor of the light's shader nodes, averaged over its surface."""
+        if not data.use_nodes or data.node_tree is None:
+            return np.ones(3)
+        output = active_output(data.node_tree, "ShaderNodeOutputLight")
+        if output is None:
+            return np.zeros(3)
+        evaluator = NodeEvaluator(f"light '{data.name}'", self._images, self._notices, data.name)
+        emission = evaluate_shader(evaluator, find_socket(output.inputs, "Surface")).emission
+        if not emission.is_constant:
+            self._notices.append(f"light '{data.name}': the texture on it is not supported; its mean colour is used")
+        return emission.rgb()
+
+
+def _read_light(item, matrix, name, node_tint, notices) -> Light | None:
+    data = item.data
+    if not item.visible_diffuse or (data.type == "AREA" and data.cycles.is_portal):
+        return None
+    color = np.array(data.color, float) * data.energy * 2.0**data.exposure * node_tint
+    if data.use_temperature:
+        color *= np.array(data.temperature_color, float)
+    frame, scale = _frame(matrix)
+    if not (np.isfinite(color).all() and np.isfinite(frame).all()):
+        notices.append(f"light '{name}' has a power that is not finite: it is left out")
+        return None
+    if not color.any():
+        return None
+    if (color < 0).any():
+        notices.append(f"light '{name}' has negative power: it takes light away, as in Cycles")
+    values = {
+        "name": name, "kind": data.type, "matrix": frame, "casts_shadow": bool(data.use_shadow),
+        "dynamic": is_dynamic(item), "group": str(item.get(GROUP_PROPERTY, "")),
+    }
+    kind = _KINDS[data.type](data, scale)
+    values["color"] = tuple(float(value) for value in color * kind.pop("unit"))
+    if _linked(item):
+        notices.append(f"light '{name}' uses light linking: it lights every object here")
+    return Light(**values, **kind)
+
+
+def is_dynamic(item: bpy.types.Object) -> bool:
+    """Whether the light may move or change between frames: marked so by its role, or animated itself or by a parent."""
+    if item.get(ROLE_PROPERTY) == "dynamic":
+        return True
+    if _animated(item.data) or _animated(item.data.node_tree):
+        return True
+    while item is not None:
+        if _animated(item) or any(not constraint.mute for constraint in item.constraints):
+            return True
+        item = item.parent
+    return False
+
+
+def _animated(block) -> bool:
+    animation = block.animation_data if block is not None else None
+    return animation is not None and bool(animation.action or animation.drivers or animation.nla_tracks)
+
+
+def _linked(item: bpy.types.Object) -> bool:
+    linking = item.light_linking
+    return linking.receiver_collection is not None or linking.blocker_collection is not None
+
+
+def _frame(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The orthonormal frame of ``matrix`` (4, 4) and its scale (3,)."""
+    scale = np.linalg.norm(matrix[:3, :3], axis=0)
+    frame = matrix.copy()
+    frame[:3, :3] /= np.where(scale > 0, scale, 1.0)
+    return frame, scale
+
+
+def _point(data, _scale) -> dict:
+    # Without normalisation the sphere's radiance is energy/π whatever its size; one of radius 0 has that as its intensity.
+    radius = float(data.shadow_soft_size)
+    if data.normalize:
+        unit = 1 / (4 * np.pi)
+    else:
+        unit = radius**2 if radius > 0 else 1 / np.pi
+    return {"unit": unit, "radius": radius, "soft_falloff": bool(data.use_soft_falloff)}
+
+
+def _spot(data, scale) -> dict:
+    return {**_point(data, scale), "spot_size": float(data.spot_size), "spot_blend": float(data.spot_blend)}
+
+
+def _sun(data, _scale) -> dict:
+    # Without normalisation the strength is the radiance of a disc of this apparent size, so the irradiance grows with it.
+    unit = 1.0 if data.normalize or data.angle <= 0 else np.pi * np.sin(data.angle / 2) ** 2
+    return {"unit": unit, "angle": float(data.angle)}
+
+
+def _area(data, scale) -> dict:
+    size_x = float(data.size)
+    size_y = float(data.size_y) if data.shape in ("RECTANGLE", "ELLIPSE") else size_x
+    size_x, size_y = size_x * float(scale[0]), size_y * float(scale[1])
+    shape = "ELLIPSE" if data.shape in ("DISK", "ELLIPSE") else "RECTANGLE"
+    area = size_x * size_y * (np.pi / 4 if shape == "ELLIPSE" else 1.0)
+    unit = 1 / np.pi if not data.normalize else 1 / (np.pi * area) if area > 0 else 0.0
+    return {"unit": unit, "shape": shape, "size_x": size_x, "size_y": size_y, "spread": float(data.spread)}
+
+
+_KINDS = {"POINT": _point, "SPOT": _spot, "SUN": _sun, "AREA": _area}

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Material datablocks to ``core.snapshot.Material``: one diffuse, emitting, possibly perforated surface each.
+
+``surface_shaders`` says what each kind of shader becomes. Here the result is laid out for the bake: one texture mapping per
+material (the base colour's, else the opacity's, else the emission's) and at most two textures.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ..core.snapshot import NO_IMAGE, Material
+from .images import ImageTable
+from .node_links import Unsupported, active_output, find_socket
+from .notices import Notices
+from .shader_nodes import NodeEvaluator
+from .shader_values import ONE, Domain, Value, apply, constant
+from .surface_shaders import DEFAULT_GREY, HOLE, Closure, evaluate_shader
+
+CLIP_THRESHOLD = 0.5
+
+
+class MaterialTable:
+    """Reads materials on demand and keeps them in the order of ``SceneSnapshot.materials``."""
+
+    def __init__(self, images: ImageTable, notices: Notices):
+        self.materials: list[Material] = []
+        self.domains: list[Domain] = []  # the texture mapping of each material, to be applied to its corners' UVs
+        self._images = images
+        self._notices = notices
+        self._indices: dict[int, int] = {}
+
+    def index(self, material: bpy.types.Material | None) -> int:
+        """Row of ``material``; None is Blender's default grey surface."""
+        key = material.as_pointer() if material is not None else 0
+        if key not in self._indices:
+            self._indices[key] = len(self.materials)
+            if material is None:
+                self._append("", Closure(DEFAULT_GREY))
+            else:
+                self._append(material.name, self._closure(material))
+        return self._indices[key]
+
+    def is_hole(self, index: int) -> bool:
+        """Whether nothing of the surface is left: light passes everywhere."""
+        material = self.materials[index]
+        return material.alpha_image == NO_IMAGE and material.alpha < material.alpha_threshold
+
+    def is_textured(self, index: int) -> bool:
+        """Whether the surface samples any image."""
+        material = self.materials[index]
+        return max(material.base_image, material.emission_image, material.alpha_image) != NO_IMAGE
+
+    def _closure(self, material: bpy.types.Material) -> Closure:
+        if material.node_tree is None or not material.use_nodes:
+            return Closure(constant(material.diffuse_color[:3]), constant(1.0))
+        evaluator = NodeEvaluator(f"material '{material.name}'", self._images, self._notices, material.name)
+        output = active_output(material.node_tree, "ShaderNodeOutputMaterial")
+        if output is None:
+            self._notices.group("materials without an output node are black", material.name)
+            return Closure()
+        surface, volume = (find_socket(output.inputs, name) for name in ("Surface", "Volume"))
+        if volume.is_linked:
+            self._notices.group("volume shaders are not supported", material.name)
+            if not surface.is_linked:
+                return HOLE
+        try:
+            return evaluate_shader(evaluator, surface)
+        except Unsupported as reason:
+            self._notices.append(f"material '{material.name}': {reason}; default grey is used")
+            return Closure(DEFAULT_GREY)
+
+    def _append(self, name: str, closure: Closure) -> None:
+        opacity = _solid_where_opaque(closure.opacity)
+        placed = [value for value in (closure.diffuse, opacity, closure.emission)
+                  if not value.is_constant and value.domain.uv_map is not None]
+        domain = placed[0].domain if placed else Domain()
+        diffuse, opacity, emission = (self._in_domain(name, role, value, domain) for role, value in (
+            ("base colour", closure.diffuse), ("alpha", opacity), ("emission", closure.emission)))
+        if opacity.is_constant and opacity.number() < CLIP_THRESHOLD and not emission.is_zero():
+            self._notices.group("emission on a transparent surface is kept and the surface blocks light", name)
+            diffuse, opacity = constant([0.0, 0.0, 0.0]), ONE
+        elif opacity.is_constant and 0.001 < opacity.number() < 0.999:
+            verdict = "opaque" if opacity.number() >= CLIP_THRESHOLD else "invisible"
+            self._notices.group(f"partial transparency is not supported: clipped at {CLIP_THRESHOLD}, so {verdict}", name)
+
+        base_image, alpha_image = self._base_images(name, diffuse, opacity)
+        self.domains.append(domain)
+        self.materials.append(Material(
+            name=name,
+            base_color=_color(diffuse),
+            emission=_color(emission),
+            base_image=base_image,
+            alpha_image=alpha_image,
+            emission_image=NO_IMAGE if emission.is_constant else self._add(f"{name} emission", emission, None),
+            alpha=opacity.number() if opacity.is_constant else 1.0,
+            alpha_threshold=0.0 if opacity.is_constant and opacity.number() >= CLIP_THRESHOLD else CLIP_THRESHOLD,
+        ))
+
+    def _in_domain(self, name: str, role: str, value: Value, domain: Domain) -> Value:
+        """``value`` as it can be sampled with the material's one mapping: textures that lie elsewhere become their mean."""
+        if value.is_constant or value.domain == domain:
+            return value
+        if value.domain.uv_map is not None:
+            self._notices.append(f"material '{name}': the {role} texture has a mapping of its own; its mean is used")
+        return constant(value.mean())
+
+    def _base_images(self, name: str, diffuse: Value, opacity: Value) -> tuple[int, int]:
+        """(base image, alpha image): one image for both where they come from one."""
+        if opacity.is_constant:
+            return (NO_IMAGE if diffuse.is_constant else self._add(name, diffuse, None)), NO_IMAGE
+        whole = self._images.whole(opacity.pixels)
+        if whole is not None and float(opacity.scale[0]) == 1 and (
+                diffuse.is_constant or self._images.whole(diffuse.pixels) is whole):
+            index = self._images.add(name, whole, opacity.domain.extension)
+            return (NO_IMAGE if diffuse.is_constant else index), index
+        if diffuse.is_constant:
+            return NO_IMAGE, self._add(f"{name} alpha", Value(np.ones(3, np.float32), np.ones_like(opacity.pixels),
+                                                              opacity.domain), opacity)
+        index = self._add(name, diffuse, opacity)
+        return index, index
+
+    def _add(self, name: str, color: Value, opacity: Value | None) -> int:
+        """Store the pixels of ``color``, without its factor, with ``opacity`` as alpha channel."""
+        whole = self._images.whole(color.pixels) if opacity is None else None
+        if whole is None:
+            whole = _rgba(color, opacity)
+        return self._images.add(name, whole, color.domain.extension)
+
+
+def apply_domain(domain: Domain, corner_uvs: np.ndarray) -> np.ndarray:
+    """``corner_uvs`` (T, 3, 2) through the domain's texture mapping, float32."""
+    matrix = np.array(domain.matrix).reshape(2, 3)
+    if np.array_equal(matrix, np.eye(2, 3)):
+        return corner_uvs
+    return (corner_uvs @ matrix[:, :2].T + matrix[:, 2]).astype(np.float32)
+
+
+def _solid_where_opaque(opacity: Value) -> Value:
+    """Constant 1 for an alpha texture without holes, so that nobody samples it."""
+    if not opacity.is_constant and float(opacity.array().min()) >= CLIP_THRESHOLD:
+        return ONE
+    return opacity
+
+
+def _color(value: Value) -> tuple[float, float, float]:
+    """The constant factor of a colour; negative reflectances and emissions do not exist on a surface."""
+    return tuple(float(channel) for channel in np.maximum(np.broadcast_to(value.scale, 3), 0.0))
+
+
+def _rgba(color: Value, opacity: Value | None) -> np.ndarray:
+    """(height, width, 4) float32: the pixels of ``color`` without its factor, ``opacity`` as alpha."""
+    def join(rgb, alpha):
+        shape = np.broadcast_shapes(rgb.shape[:2], alpha.shape[:2])
+        return np.concatenate([np.broadcast_to(np.maximum(rgb, 0), (*shape, 3)), np.broadcast_to(alpha, (*shape, 1))], axis=-1)
+
+    unscaled = Value(np.ones(1, np.float32), color.pixels, color.domain)
+    return apply(join, unscaled, ONE if opacity is None else opacity).pixels

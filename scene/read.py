@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Read a scene, as a render would see it, into ``core.snapshot.SceneSnapshot``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ..core.snapshot import SceneSnapshot
+from .evaluation import as_in_viewport, at_render_quality, rendered_objects
+from .geometry import MeshArrays, WorldTriangles, place, read_mesh
+from .images import ImageTable
+from .lights import LightTable
+from .materials import MaterialTable, apply_domain
+from .notices import Notices
+from .volumes import find_volumes
+from .world import read_world
+
+# Converted curves, text, surfaces and metaballs arrive as separate mesh instances of the same object.
+_WITHOUT_SURFACE = {"VOLUME": "volumes", "POINTCLOUD": "point clouds", "CURVES": "hair curves",
+                    "GREASEPENCIL": "grease pencil", "GPENCIL": "grease pencil"}
+
+
+@dataclass
+class _Instances:
+    """All instances of one mesh with one set of materials."""
+
+    mesh: MeshArrays
+    materials: list[bpy.types.Material | None]  # per slot, original datablocks
+    matrices: list[np.ndarray] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+
+
+@dataclass
+class _Harvest:
+    """What has to be taken out of the depsgraph while it lives."""
+
+    groups: dict[tuple, _Instances] = field(default_factory=dict)
+    meshes: dict[int, MeshArrays] = field(default_factory=dict)
+    lights: list[tuple[bpy.types.Object, np.ndarray, str]] = field(default_factory=list)
+
+
+def read_scene(
+    scene: bpy.types.Scene,
+    view_layer: bpy.types.ViewLayer | None = None,
+    *,
+    frame: int | None = None,
+    live: bool = False,
+) -> SceneSnapshot:
+    """Everything that light needs to know about ``scene``, in world space.
+
+    Args:
+        view_layer: the first one by default.
+        frame: evaluate there; the scene is back at its own frame afterwards.
+        live: read what the viewport shows, at its subdivision levels, instead of what a render would. Nothing is evaluated
+            anew, so this is the way to follow edits.
+
+    Raises:
+        RuntimeError: Blender is rendering and cannot evaluate the scene at render quality now.
+    """
+    view_layer = view_layer or scene.view_layers[0]
+    own_frame, own_subframe = scene.frame_current, scene.frame_subframe
+    moved = frame is not None and frame != own_frame
+    if moved:
+        scene.frame_set(frame)
+    try:
+        return _read(scene, view_layer, as_in_viewport if live else at_render_quality)
+    finally:
+        if moved:
+            scene.frame_set(own_frame, subframe=own_subframe)
+
+
+def _read(scene, view_layer, evaluate) -> SceneSnapshot:
+    notices = Notices()
+    harvest = evaluate(scene, view_layer, lambda depsgraph: _harvest(depsgraph, rendered_objects(view_layer), notices))
+    images = ImageTable(notices)
+    materials = MaterialTable(images, notices)
+    override = view_layer.material_override
+    parts, object_names = [], []
+    for group in harvest.groups.values():
+        slots = [override] if override else group.materials
+        part = _assemble(group, slots, materials, len(object_names), notices)
+        object_names += group.names
+        if part is not None:
+            parts.append(part)
+    lights = LightTable(images, notices)
+    for item, matrix, name in harvest.lights:
+        lights.add(item, matrix, name)
+    return SceneSnapshot(
+        **_joined(parts),
+        object_names=object_names,
+        materials=materials.materials,
+        images=images.images,
+        lights=lights.lights,
+        world=read_world(scene, notices),
+        volumes=find_volumes(scene),
+        exposure=float(scene.view_settings.exposure),
+        frame=scene.frame_current,
+        name=scene.name,
+        warnings=notices.lines(),
+    )
+
+
+def _harvest(depsgraph: bpy.types.Depsgraph, rendered: set[int], notices: Notices) -> _Harvest:
+    """Take meshes, lights and their places out of ``depsgraph``.
+
+    Args:
+        rendered: ``session_uid`` of the objects that a render shows; a viewport depsgraph holds others too.
+    """
+    harvest = _Harvest()
+    for instance in depsgraph.object_instances:  # each one dies with its step of the iterator
+        item = instance.object
+        owner = instance.parent if instance.is_instance else item
+        if not instance.show_self or item.hide_render or owner.session_uid not in rendered:
+            continue
+        if item.type in _WITHOUT_SURFACE:
+            notices.group(f"{_WITHOUT_SURFACE[item.type]} are not supported and are left out", item.name)
+        if item.type not in ("MESH", "LIGHT"):
+            continue
+        matrix = np.array(instance.matrix_world, dtype=np.float64)
+        name = f"{instance.parent.name} > {item.name}" if instance.is_instance else item.name
+        if not np.isfinite(matrix).all():
+            notices.group("objects whose transform is not finite are left out", name)
+        elif item.type == "LIGHT":
+            harvest.lights.append((item.original, matrix, name))
+        elif _receives_diffuse_rays(item, notices):
+            _add_mesh(harvest, item, matrix, name, notices)
+    return harvest
+
+
+def _receives_diffuse_rays(item: bpy.types.Object, notices: Notices) -> bool:
+    """Whether light transport meets the object at all; half-visible objects count as visible."""
+    for system in item.particle_systems:
+        if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
+            notices.group("particle hair is not supported and is left out", item.name)
+    if not item.visible_diffuse and not item.visible_shadow:
+        return False
+    if not (item.visible_diffuse and item.visible_shadow):
+        notices.group("ray visibility is not supported: these reflect light and cast shadows", item.name)
+    if item.is_shadow_catcher or item.is_holdout:
+        notices.group("holdouts and shadow catchers are lit like any other surface", item.name)
+    return True
+
+
+def _add_mesh(harvest: _Harvest, item: bpy.types.Object, matrix: np.ndarray, name: str, notices: Notices) -> None:
+    mesh = item.data
+    key = mesh.as_pointer()
+    if key not in harvest.meshes:
+        arrays = harvest.meshes[key] = read_mesh(mesh)
+        if arrays.not_finite:
+            notices.append(f"object '{name}': {arrays.not_finite} triangles have corners that are not finite and are left out; "
+                           "clean the mesh up")
+        if arrays.needles:
+            notices.append(f"object '{name}': {arrays.needles} triangles without area are left out")
+    slots = _slot_materials(item, mesh)
+    group_key = (key, *(material.as_pointer() if material else 0 for material in slots))
+    group = harvest.groups.get(group_key)
+    if group is None:
+        group = harvest.groups[group_key] = _Instances(harvest.meshes[key], slots)
+    group.matrices.append(matrix)
+    group.names.append(name)
+
+
+def _slot_materials(item: bpy.types.Object, mesh: bpy.types.Mesh) -> list[bpy.types.Material | None]:
+    """Material of every slot: the object's where it is linked to the object, else the evaluated mesh's."""
+    materials = list(mesh.materials)
+    for index, slot in enumerate(item.material_slots):
+        if slot.link == "OBJECT":
+            materials += [None] * (index + 1 - len(materials))
+            materials[index] = slot.material
+    return [material.original if material else None for material in materials]
+
+
+def _assemble(group: _Instances, slots, materials: MaterialTable, first_object: int, notices: Notices) -> dict | None:
+    """World triangles of ``group`` with their per-triangle arrays; None where nothing is left."""
+    mesh = group.mesh
+    rows = np.array([materials.index(material) for material in slots] or [materials.index(None)], np.int32)
+    used = rows[np.clip(mesh.slots, 0, len(rows) - 1)]
+    uvs = _corner_uvs(mesh, used, materials, group.names[0], notices)
+    visible = ~np.isin(used, [row for row in np.unique(used) if materials.is_hole(row)])
+    if not visible.any():
+        return None
+    if not visible.all():
+        mesh = MeshArrays(mesh.vertices, mesh.triangles[visible], mesh.corner_normals[visible], mesh.slots[visible], {}, "")
+        used, uvs = used[visible], uvs[visible]
+    count = len(group.matrices)
+    world: WorldTriangles = place(mesh, uvs, np.array(group.matrices))
+    return {
+        "vertices": world.vertices,
+        "triangles": world.triangles,
+        "corner_normals": world.corner_normals,
+        "corner_uvs": world.corner_uvs,
+        "material_index": np.tile(used, count),
+        "object_index": np.repeat(np.arange(first_object, first_object + count, dtype=np.int32), len(used)),
+    }
+
+
+def _corner_uvs(mesh: MeshArrays, used: np.ndarray, materials: MaterialTable, name: str, notices: Notices) -> np.ndarray:
+    """(T, 3, 2) float32 texture coordinates, each triangle's through its own material's mapping."""
+    uvs = np.zeros((len(mesh.triangles), 3, 2), np.float32)
+    for row in np.unique(used):
+        if not materials.is_textured(row):
+            continue
+        domain = materials.domains[row]
+        source = mesh.uv_maps.get(domain.uv_map or mesh.active_uv_map)
+        if source is None:
+            notices.group(f"without the UV map of material '{materials.materials[row].name}' a texture shows one colour", name)
+            continue
+        mine = used == row
+        uvs[mine] = apply_domain(domain, source[mine])
+    return uvs
+
+
+def _joined(parts: list[dict]) -> dict:
+    """One array per field; vertex indices move behind the parts before."""
+    if not parts:
+        return {
+            "vertices": np.empty((0, 3)), "triangles": np.empty((0, 3), np.int32),
+            "corner_normals": np.empty((0, 3, 3), np.float32), "corner_uvs": np.empty((0, 3, 2), np.float32),
+            "material_index": np.empty(0, np.int32), "object_index": np.empty(0, np.int32),
+        }
+    offset = 0
+    for part in parts:
+        part["triangles"] += offset
+        offset += len(part["vertices"])
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Surface shader nodes as one closure: how much they reflect diffusely, let through and emit.
+
+What each closure becomes is chosen so that the light that leaves the surface, summed over all directions, is as close to Cycles
+as a diffuse reflector with holes can be:
+
+- Diffuse, Subsurface, Toon, Sheen, Translucent: their colour reflects diffusely. Glossy nodes too: the energy is right, the
+  direction is spread.
+- Principled: base colour × (1 − metallic) × (1 − transmission); coat, sheen and the few percent of specular are left out. Metal
+  therefore reflects nothing, which is said in a warning.
+- Glass, Refraction and Principled with more than half transmission let light through unbent and uncoloured: a hole. Thin panes
+  are what such materials mostly are, and caustics of solid glass are beyond a light probe.
+- Mix Shader and Add Shader combine these per pixel. Normal inputs are ignored; they turn light, they do not make it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+
+from .node_links import Scope, Unsupported, find_socket, resolve
+from .shader_nodes import NodeEvaluator
+from .shader_values import ONE, ZERO, Value, add, apply, blend, complement, constant, multiply
+
+DEFAULT_GREY = constant([0.8, 0.8, 0.8])
+
+
+@dataclass(frozen=True)
+class Closure:
+    """``diffuse`` is the albedo of the part that is not hole, ``opacity`` that part, ``emission`` radiance of the whole."""
+
+    diffuse: Value = constant([0.0, 0.0, 0.0])
+    opacity: Value = ONE
+    emission: Value = constant([0.0, 0.0, 0.0])
+
+
+BLACK = Closure()
+HOLE = Closure(opacity=ZERO)
+
+
+def evaluate_shader(evaluator: NodeEvaluator, socket: bpy.types.NodeSocket, scope: Scope | None = None) -> Closure:
+    """Closure that arrives at the shader input ``socket``; without a link that is black, as in Cycles."""
+    try:
+        source, scope = resolve(socket, scope)
+    except Unsupported as reason:
+        evaluator.notices.append(f"{evaluator.owner}: {reason}; default grey is used")
+        return Closure(DEFAULT_GREY)
+    if not source.is_output:
+        return BLACK
+    node = source.node
+    if source.type != "SHADER":  # a colour plugged into a shader input emits
+        return Closure(emission=_as_color(evaluator.output(source, scope)))
+    evaluate = _SHADERS.get(node.bl_idname)
+    if evaluate is not None:
+        return evaluate(evaluator, node, scope)
+    name = next((name for name in ("Color", "Base Color") if find_socket(node.inputs, name) is not None), None)
+    used = "its colour is used as a diffuse one" if name else "default grey is used"
+    evaluator.notices.append(f"{evaluator.owner}: shader node '{node.name}' ({node.bl_label}) is not supported; {used}")
+    return Closure(evaluator.input(node, name, scope) if name else DEFAULT_GREY)
+
+
+def _as_color(value: Value) -> Value:
+    return value if value.scale.size == 3 else value.scaled(np.ones(3))
+
+
+def _principled(evaluator, node, scope):
+    def value(name):
+        return evaluator.input(node, name, scope)
+
+    metallic, transmission = value("Metallic"), value("Transmission Weight").number()
+    diffuse = value("Base Color")
+    if not metallic.is_zero():
+        diffuse = multiply(diffuse, complement(metallic))
+        if metallic.number() > 0.5:
+            evaluator.notices.group("metallic materials reflect no diffuse light and so look dark to the probes",
+                                    evaluator.owner_name)
+    opacity = value("Alpha")
+    if transmission > 0.5:
+        evaluator.notices.group("glass lets light through unbent and uncoloured", evaluator.owner_name)
+        opacity = ZERO
+    elif transmission > 0:
+        diffuse = diffuse.scaled(1 - transmission)
+    strength = value("Emission Strength")
+    emission = Closure.emission if strength.is_zero() else multiply(value("Emission Color"), strength)
+    return Closure(diffuse, opacity, emission)
+
+
+def _eevee_specular(evaluator, node, scope):
+    return Closure(evaluator.input(node, "Base Color", scope), complement(evaluator.input(node, "Transparency", scope)),
+                   evaluator.input(node, "Emissive Color", scope))
+
+
+def _diffuse(evaluator, node, scope):
+    return Closure(evaluator.input(node, "Color", scope))
+
+
+def _glossy(evaluator, node, scope):
+    evaluator.notices.group("glossy shaders reflect their colour in all directions", evaluator.owner_name)
+    name = "Color" if find_socket(node.inputs, "Color") is not None else "Base Color"
+    return Closure(evaluator.input(node, name, scope))
+
+
+def _translucent(evaluator, node, scope):
+    evaluator.notices.group("translucent shaders reflect instead of letting light through", evaluator.owner_name)
+    return _diffuse(evaluator, node, scope)
+
+
+def _glass(evaluator, node, scope):
+    evaluator.notices.group("glass lets light through unbent and uncoloured", evaluator.owner_name)
+    return HOLE
+
+
+def _transparent(evaluator, node, scope):
+    color = evaluator.input(node, "Color", scope)
+    if color.is_constant and np.ptp(color.rgb()) > 0.05:
+        evaluator.notices.group("coloured transparency is not supported: what passes stays white", evaluator.owner_name)
+    return Closure(opacity=apply(lambda rgb: 1 - rgb.mean(axis=-1, keepdims=True), color))
+
+
+def _emission(evaluator, node, scope):
+    return Closure(emission=multiply(evaluator.input(node, "Color", scope), evaluator.input(node, "Strength", scope)))
+
+
+def _holdout(evaluator, node, scope):
+    evaluator.notices.group("holdout shaders are black to light", evaluator.owner_name)
+    return BLACK
+
+
+def _mix(evaluator, node, scope):
+    factor = evaluator.input(node, "Fac", scope)
+    first, second = (evaluate_shader(evaluator, node.inputs[index], scope) for index in (1, 2))
+    if factor.is_constant:
+        share = float(np.clip(factor.number(), 0, 1))
+        if share in (0.0, 1.0):
+            return second if share else first
+        factor = constant(share)
+    else:
+        factor = apply(lambda f: np.clip(f, 0, 1), factor)
+    return Closure(
+        _opaque_mix(factor, first, second),
+        blend(factor, first.opacity, second.opacity),
+        blend(factor, first.emission, second.emission),
+    )
+
+
+def _opaque_mix(factor: Value, first: Closure, second: Closure) -> Value:
+    """Albedo of the opaque part of a mix: a hole takes part of the area, not of the colour."""
+    if first.opacity.is_zero():
+        return second.diffuse
+    if second.opacity.is_zero():
+        return first.diffuse
+    if first.opacity is ONE and second.opacity is ONE:
+        return blend(factor, first.diffuse, second.diffuse)
+
+    def weighted(f, first_opacity, second_opacity, first_color, second_color):
+        one, other = first_opacity * (1 - f), second_opacity * f
+        total = one + other
+        return (first_color * one + second_color * other) / np.where(total > 0, total, 1)
+
+    return apply(weighted, factor, first.opacity, second.opacity, first.diffuse, second.diffuse)
+
+
+def _add(evaluator, node, scope):
+    first, second = (evaluate_shader(evaluator, item, scope) for item in node.inputs[:2])
+    emission = add(first.emission, second.emission)
+    if first.opacity is ONE and second.opacity is ONE:
+        return Closure(add(first.diffuse, second.diffuse), ONE, emission)
+    opacity = apply(lambda a, b: np.clip(a + b - 1, 0, 1), first.opacity, second.opacity)  # what both let through adds up
+    solid = first if second.opacity.is_zero() else second
+    return replace(solid, opacity=opacity, emission=emission)
+
+
+_SHADERS = {
+    "ShaderNodeBsdfPrincipled": _principled,
+    "ShaderNodeEeveeSpecular": _eevee_specular,
+    "ShaderNodeBsdfDiffuse": _diffuse,
+    "ShaderNodeSubsurfaceScattering": _diffuse,
+    "ShaderNodeBsdfToon": _diffuse,
+    "ShaderNodeBsdfSheen": _diffuse,
+    "ShaderNodeBsdfTranslucent": _translucent,
+    "ShaderNodeBsdfAnisotropic": _glossy,
+    "ShaderNodeBsdfGlossy": _glossy,
+    "ShaderNodeBsdfMetallic": _glossy,
+    "ShaderNodeBsdfGlass": _glass,
+    "ShaderNodeBsdfRefraction": _glass,
+    "ShaderNodeBsdfTransparent": _transparent,
+    "ShaderNodeEmission": _emission,
+    "ShaderNodeHoldout": _holdout,
+    "ShaderNodeMixShader": _mix,
+    "ShaderNodeAddShader": _add,
+}
