@@ -113,7 +113,7 @@ def _harvest(depsgraph: bpy.types.Depsgraph, rendered: set[int], notices: Notice
     for instance in depsgraph.object_instances:  # each one dies with its step of the iterator
         item = instance.object
         owner = instance.parent if instance.is_instance else item
-        if not instance.show_self or item.hide_render or owner.session_uid not in rendered:
+        if not instance.show_self or item.hide_render or owner.original.session_uid not in rendered:
             continue
         if item.type in _WITHOUT_SURFACE:
             notices.group(f"{_WITHOUT_SURFACE[item.type]} are not supported and are left out", item.name)
