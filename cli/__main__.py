@@ -22,7 +22,11 @@ def load_package():
 
 
 if __name__ == "__main__":
-    load_package()
-    from gridlight.cli.main import main
+    try:
+        load_package()
+        from gridlight.cli.main import main
 
-    sys.exit(main(sys.argv[1:]))
+        status = main(sys.argv[1:])
+    except KeyboardInterrupt:  # before main could take it
+        status = 130
+    sys.exit(status)

@@ -16,7 +16,6 @@ import importlib
 import importlib.util
 import json
 import os
-import signal
 import sys
 import traceback
 
@@ -67,8 +66,10 @@ def _guarded(argv: list[str], in_blender: bool, child: bool) -> int:
         return error.exit_status
     except BrokenPipeError:
         # Whoever read our output has enough. Python would complain again when it flushes at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except SystemExit as end:  # argparse after --help; Blender must not end for it
+        return end.code or 0
     except MemoryError:
         _say("not enough memory for this; use a lower --resolution, --face or --memory")
         return InputError.exit_status
@@ -93,17 +94,14 @@ def _run(argv: list[str], in_blender: bool, child: bool) -> int:
             staging.remove_leftovers(args.output, process)
         return status
     stop = Stop()
-    previous = signal.signal(signal.SIGINT, stop.ask) if module.NEEDS_BLENDER else None
     if child:
-        signal.signal(signal.SIGTERM, stop.ask)
+        worker.accept_interrupts(stop.ask)
     reporter = Reporter(quiet=getattr(args, "quiet", False))
     try:
         summary, status = module.run(args, reporter, stop)
         reporter.finish()
     finally:
         reporter.abandon()
-        if previous is not None:
-            signal.signal(signal.SIGINT, previous)
     print(json.dumps(summary, allow_nan=False), flush=True)
     return status
 
@@ -121,7 +119,8 @@ def _parser(modules: dict, in_blender: bool) -> Parser:
     for name, module in modules.items():
         sub = subparsers.add_parser(name, help=module.HELP, description=module.HELP)
         module.add_arguments(sub, in_blender)
-        sub.add_argument("--verbose", action="store_true", help="show what Blender itself prints")
+        if module.NEEDS_BLENDER:
+            sub.add_argument("--verbose", action="store_true", help="show what Blender itself prints")
     return parser
 
 

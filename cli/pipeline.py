@@ -57,23 +57,11 @@ def start_gpu(stopwatch: Stopwatch) -> None:
 
 
 def check_snapshot(snapshot: SceneSnapshot, reporter) -> None:
-    """Refuses a scene without surfaces; warns of one without light."""
+    """Refuses a scene without surfaces and passes on what the reader warns of."""
     if not len(snapshot.triangles):
         raise InputError(f"scene '{snapshot.name}' has no surface that renders; add a mesh, or enable one for rendering")
     for warning in snapshot.warnings:
         reporter.warn(warning)
-    if not _has_light(snapshot):
-        reporter.warn(f"scene '{snapshot.name}' has no light, so the baked field is black; add a light, an emissive "
-                      "material or a world that is not black")
-
-
-def _has_light(snapshot: SceneSnapshot) -> bool:
-    if any(max(light.color) > 0 for light in snapshot.lights):
-        return True
-    if max(snapshot.world.color) > 0 or (snapshot.world.map is not None and snapshot.world.map.any()):
-        return True
-    used = np.unique(snapshot.material_index)
-    return any(max(snapshot.materials[index].emission) > 0 for index in used)
 
 
 def bake_volumes(snapshot: SceneSnapshot, grids: list[Grid], settings: BakeSettings, folder: StagedFolder, reporter, should_stop,
@@ -81,9 +69,11 @@ def bake_volumes(snapshot: SceneSnapshot, grids: list[Grid], settings: BakeSetti
     """Bakes ``grids`` and stages probe files, pictures and report in ``folder``. Returns (summary, exit status)."""
     from ..bake.job import run_bake
     from ..bake.preview import write_previews
+    from ..gpu_shaders.context import device_description
 
     for grid in grids:
         probe_file.check_size(grid, settings.bands)
+    device = device_description()
     results = []
     for grid in grids:
         result = run_bake(snapshot, grid, settings, reporter, should_stop)
@@ -97,11 +87,11 @@ def bake_volumes(snapshot: SceneSnapshot, grids: list[Grid], settings: BakeSetti
         reporter.phase("write")
         for name, result in zip(file_names(grids), results):
             result.field.metadata = {**result.field.metadata, **probe_metadata.provenance(
-                snapshot, settings, result.device, result.iterations, result.converged, reporter.warnings)}
+                snapshot, settings, device, result.iterations, result.converged, reporter.warnings)}
             probe_file.write(folder.path(name), result.field)
         write_previews(snapshot, [result.field for result in results], folder.path("preview.png"),
                        folder.path("preview_probes.png"))
-    summary = _summary(results, settings, stopwatch, reporter)
+    summary = _summary(results, device, settings, stopwatch, reporter)
     write_report(folder.path("report.html"), snapshot, settings, results, summary, preview=folder.staged("preview.png"))
     summary["files"] = [str(folder.folder / name) for name in folder.names]
     converged = all(result.converged for result in results)
@@ -111,7 +101,7 @@ def bake_volumes(snapshot: SceneSnapshot, grids: list[Grid], settings: BakeSetti
     return summary, 0 if converged else NOT_CONVERGED
 
 
-def _summary(results, settings: BakeSettings, stopwatch: Stopwatch, reporter) -> dict:
+def _summary(results, device: str, settings: BakeSettings, stopwatch: Stopwatch, reporter) -> dict:
     states = np.concatenate([result.field.state for result in results])
     return {
         "probes": {"total": len(states), "active": int((states == ACTIVE).sum()), "culled": int((states == CULLED).sum()),
@@ -119,7 +109,7 @@ def _summary(results, settings: BakeSettings, stopwatch: Stopwatch, reporter) ->
         "iterations": max(result.iterations for result in results),
         "converged": all(result.converged for result in results),
         "seconds": stopwatch.totals(),
-        "device": results[0].device,
+        "device": device,
         "settings": settings.as_dict(),
         "files": [],
         "warnings": reporter.warnings,

@@ -25,6 +25,7 @@ from . import system_libraries
 
 DESCRIPTORS = "GRIDLIGHT_WORKER_DESCRIPTORS"
 CONTEXT_READY = "context"
+INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
 LOG_TAIL = 4000  # characters of Blender's chatter worth showing after a crash
 
 _status_descriptor: int | None = None
@@ -61,6 +62,13 @@ def _end_with_parent(parent_alive: int) -> None:
     os.kill(os.getpid(), signal.SIGTERM)
 
 
+def accept_interrupts(handler) -> None:
+    """From here on ``handler`` gets the interrupts; the parent held them back while this process started."""
+    for number in INTERRUPTS:
+        signal.signal(number, handler)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, INTERRUPTS)
+
+
 def leave(status: int) -> None:
     """Ends the child at once: the wheels can hang when the interpreter shuts down."""
     for stream in (sys.stdout, sys.stderr):
@@ -81,6 +89,8 @@ def run_in_child(argv: list[str], say, needs_gpu: bool, verbose: bool) -> tuple[
     alive_read, alive_write = os.pipe()
     with tempfile.TemporaryFile() as log:
         start = Path(__file__).with_name("__main__.py")
+        # Held back here and, by inheritance, in the child until each has its handler: none is lost, none is a traceback.
+        signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
         # A process group of its own: Ctrl-C on a terminal reaches only this process, which forwards it exactly once.
         child = subprocess.Popen(
             [sys.executable, "-I", str(start), *argv],
@@ -88,7 +98,8 @@ def run_in_child(argv: list[str], say, needs_gpu: bool, verbose: bool) -> tuple[
             pass_fds=(status_write, log.fileno(), alive_read), stdin=subprocess.DEVNULL, process_group=0)
         os.close(status_write)
         os.close(alive_read)
-        interrupts = _forward_interrupts(child)
+        interrupts = _forward_interrupts(child, say)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, INTERRUPTS)
         code = child.wait()
         os.close(alive_write)
         with os.fdopen(status_read, encoding="utf-8") as status:
@@ -108,15 +119,17 @@ def run_in_child(argv: list[str], say, needs_gpu: bool, verbose: bool) -> tuple[
     return 3, child.pid
 
 
-def _forward_interrupts(child) -> list[int]:
-    """Hands SIGINT and SIGTERM on to the child, a second one kills it. Returns the list that collects them."""
+def _forward_interrupts(child, say) -> list[int]:
+    """Hands interrupts on to the child, a second one kills it. Returns the list that collects them."""
     received = []
 
     def forward(number, _frame):
         received.append(number)
+        if len(received) == 1:
+            say("stopping at the end of this step; once more stops at once")
         child.send_signal(signal.SIGINT if len(received) == 1 else signal.SIGKILL)
 
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for number in INTERRUPTS:
         signal.signal(number, forward)
     return received
 

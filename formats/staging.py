@@ -26,8 +26,8 @@ class StagedFolder:
         self._made: list[Path] = []
 
     def __enter__(self):
-        missing = [folder for folder in (self.folder, *self.folder.parents) if not folder.exists()]
         try:
+            missing = [folder for folder in (self.folder, *self.folder.parents) if not folder.exists()]
             for folder in reversed(missing):
                 folder.mkdir()
                 self._made.insert(0, folder)
