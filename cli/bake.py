@@ -95,7 +95,7 @@ def run(args, reporter, should_stop):
             snapshot = read_scene(scene)
         pipeline.check_snapshot(snapshot, reporter)
         grids = choose_grids(args, snapshot)
-        pipeline.start_gpu(stopwatch)
+        pipeline.start_gpu(reporter, stopwatch)
         return pipeline.bake_volumes(snapshot, grids, settings, folder, reporter, should_stop, stopwatch)
 
 
@@ -104,12 +104,14 @@ def choose_grids(args, snapshot) -> list[Grid]:
 
     ``--resolution`` and ``--spacing`` also apply to volumes of the file.
     """
-    from ..scene.volumes import fit_volume
-
     if args.min is not None:
         volumes = [Volume("volume", Grid.from_bounds(args.min, args.max, (1, 1, 1)).matrix, args.resolution or (1, 1, 1))]
+    elif snapshot.volumes:
+        volumes = snapshot.volumes
     else:
-        volumes = snapshot.volumes or [fit_volume(snapshot)]
+        from ..scene.volumes import fit_volume
+
+        volumes = [fit_volume(snapshot)]
     grids = []
     for volume in volumes:
         resolution = args.resolution or volume.resolution

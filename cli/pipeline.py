@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
 import time
 from contextlib import contextmanager
@@ -15,7 +16,6 @@ from ..core.grid import Grid
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..formats import probe_file, probe_metadata
-from ..formats.report import write_report
 from ..formats.staging import StagedFolder
 from . import worker
 
@@ -47,10 +47,11 @@ class Stopwatch:
         return {phase: round(self.seconds[phase], 6) for phase in PHASES}
 
 
-def start_gpu(stopwatch: Stopwatch) -> None:
+def start_gpu(reporter, stopwatch: Stopwatch) -> None:
     """Makes the GPU context and says so to the parent process. Before 5.2 this needs a session that nothing is open in."""
     from ..gpu_shaders.context import ensure_context
 
+    reporter.phase("GPU context")
     with stopwatch.measure("setup"):
         ensure_context()
     worker.milestone(worker.CONTEXT_READY)
@@ -68,7 +69,6 @@ def bake_volumes(snapshot: SceneSnapshot, grids: list[Grid], settings: BakeSetti
                  stopwatch: Stopwatch) -> tuple[dict, int]:
     """Bakes ``grids`` and stages probe files, pictures and report in ``folder``. Returns (summary, exit status)."""
     from ..bake.job import run_bake
-    from ..bake.preview import write_previews
     from ..gpu_shaders.context import device_description
 
     for grid in grids:
@@ -89,10 +89,16 @@ def bake_volumes(snapshot: SceneSnapshot, grids: list[Grid], settings: BakeSetti
             result.field.metadata = {**result.field.metadata, **probe_metadata.provenance(
                 snapshot, settings, device, result.iterations, result.converged, reporter.warnings)}
             probe_file.write(folder.path(name), result.field)
-        write_previews(snapshot, [result.field for result in results], folder.path("preview.png"),
-                       folder.path("preview_probes.png"))
+        if importlib.util.find_spec("..bake.preview", __package__):  # until it lands
+            from ..bake.preview import write_previews
+
+            write_previews(snapshot, [result.field for result in results], folder.path("preview.png"),
+                           folder.path("preview_probes.png"))
     summary = _summary(results, device, settings, stopwatch, reporter)
-    write_report(folder.path("report.html"), snapshot, settings, results, summary, preview=folder.staged("preview.png"))
+    if importlib.util.find_spec("..formats.report", __package__):  # until it lands
+        from ..formats.report import write_report
+
+        write_report(folder.path("report.html"), snapshot, settings, results, summary, preview=folder.staged("preview.png"))
     summary["files"] = [str(folder.folder / name) for name in folder.names]
     converged = all(result.converged for result in results)
     if not converged:
