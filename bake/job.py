@@ -25,6 +25,7 @@ from ..core.orientation import flipped_objects
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..gpu_shaders.backend import GpuBackend, Surfaces
+from ..gpu_shaders.scene_textures import SceneTextures
 from .capture_choice import choose_capture
 from .convergence import Convergence
 
@@ -56,6 +57,7 @@ class BakeResult:
     seconds: dict[str, float] = default(default_factory=dict)
     counts: dict[str, int] = default(default_factory=dict)
     capture: str = ""
+    scene: SceneTextures | None = None  # for pictures: the scene as it lies on the GPU
     notes: list[str] = default(default_factory=list)
     warnings: list[str] = default(default_factory=list)
 
@@ -90,6 +92,7 @@ def bake_steps(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, repo
     with _timed(result, "setup"):
         reporter.phase("upload")
         backend = GpuBackend(snapshot, grid, settings)
+        result.scene = backend.scene
         nodes = np.flatnonzero(state == ACTIVE)
         positions = grid.positions()[nodes]
     yield

@@ -37,6 +37,17 @@ def least_deviation(grid: Grid) -> float:
     return 0.02 * float(grid.cell_size().min())
 
 
+def grid_info(grid: Grid) -> np.ndarray:
+    """(5, 4) float32: the block that lookup_lib.glsl reads, positions relative to the grid's centre."""
+    info = np.zeros((5, 4), np.float32)
+    to_lattice = grid.world_to_lattice()
+    info[:3, :3] = to_lattice[:, :3]
+    info[:3, 3] = to_lattice[:, :3] @ grid.center + to_lattice[:, 3]
+    info[3] = (*grid.resolution, depth_clamp(grid))
+    info[4, :2] = visibility_bias(grid), least_deviation(grid)
+    return info
+
+
 def lookup_weights(field: Field, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Nodes (N, 8) and weights (N, 8), summing to 1, that make up the field at ``points`` (N, 3) with ``normals`` (N, 3)."""
     grid = field.grid

@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .camera import Camera
+
 NO_IMAGE = -1
 
 
@@ -126,6 +128,7 @@ class SceneSnapshot:
     lights: list[Light]
     world: World
     volumes: list[Volume] = field(default_factory=list)
+    camera: Camera | None = None
     exposure: float = 0.0  # the scene's view exposure, stops, for previews only
     frame: int = 0
     name: str = "Scene"

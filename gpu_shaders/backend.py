@@ -112,12 +112,7 @@ class GpuBackend:
             pairs[:, 0], pairs[:, 1] = inactive, nearest_active(self.grid, active)[inactive]
         self._inactive = upload(pairs, "inactive nodes") if len(inactive) and active.any() else None
         self._inactive_count = len(inactive)
-        info = np.zeros((5, 4), np.float32)
-        to_lattice = self.grid.world_to_lattice()
-        info[:3, :3] = to_lattice[:, :3]
-        info[:3, 3] = to_lattice[:, :3] @ self.grid.center + to_lattice[:, 3]
-        info[3] = (*self.grid.resolution, lookup.depth_clamp(self.grid))
-        info[4, :2] = lookup.visibility_bias(self.grid), lookup.least_deviation(self.grid)
+        info = lookup.grid_info(self.grid)
         self._grid_info = gpu.types.GPUUniformBuf(gpu.types.Buffer("FLOAT", info.size, info.reshape(-1)))
 
     # Capture ----------------------------------------------------------------------------------------------------------------

@@ -170,3 +170,15 @@ def field_extrapolate_comp(info, defines):
     info.push_constant("FLOAT", "factor")
     info.local_group_size(64, 1, 1)
     return {"compute": ["data_lib", "field_extrapolate_comp"]}
+
+
+def preview_comp(info, defines):
+    slot = _scene(info, defines)
+    slot = _lookup(info, slot)
+    _samplers(info, "lights", "field_in", "world_texels", "spheres", first=slot)
+    _image(info, 0, "picture", access="READ+WRITE")
+    info.uniform_buf(1, "vec4", "view_info[5]")
+    _ints(info, "light_count", "sample_index", "show_direct")
+    info.local_group_size(8, 8, 1)
+    return {"compute": ["data_lib", "cubemap_lib", "random_lib", "spherical_harmonics_lib", "surface_lib", "ray_lib",
+                        "direct_light_lib", "lookup_lib", "field_lib", "preview_comp"]}

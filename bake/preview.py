@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``preview.png`` and ``preview_probes.png``: what a bake looks like."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..core import camera as cameras
+from ..core.errors import Cancelled
+from ..core.field import Field
+from ..core.snapshot import SceneSnapshot
+from ..gpu_shaders.preview_pass import PreviewPass
+from ..gpu_shaders.scene_textures import SceneTextures
+
+WIDTH, HEIGHT = 960, 540
+_SAMPLES = 4  # per pixel
+
+
+def write_previews(snapshot: SceneSnapshot, scene: SceneTextures, field: Field, picture: Path, probes: Path,
+                   should_stop: Callable[[], bool]) -> None:
+    """Renders the scene with ``field``, once plain and once with its probes as spheres, into two PNG files.
+
+    ``scene`` holds ``snapshot`` with the field's grid centre as origin. The view is the scene's camera, or one inside the volume. Colours
+    go through the Standard view transform with the scene's exposure.
+
+    Raises:
+        Cancelled: ``should_stop`` returned true.
+    """
+    camera = snapshot.camera or cameras.suggest(field, WIDTH / HEIGHT)
+    renderer = PreviewPass(snapshot, scene, field)
+    for path, spheres in ((picture, False), (probes, True)):
+        radiance = renderer.render(camera, WIDTH, HEIGHT, _SAMPLES, spheres=spheres, should_stop=should_stop)
+        if radiance is None:
+            raise Cancelled("cancelled; nothing was written")
+        save_png(path, standard_view(radiance, snapshot.exposure))
+
+
+def standard_view(radiance: np.ndarray, exposure: float) -> np.ndarray:
+    """Display values 0..1 of linear ``radiance``: Blender's Standard view, which is exposure in stops and the sRGB curve
+    (IEC 61966-2-1)."""
+    linear = np.clip(np.nan_to_num(radiance) * 2.0**exposure, 0.0, 1.0)
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+
+
+def save_png(path: Path, values: np.ndarray) -> None:
+    """Writes display ``values`` (height, width, 3), row 0 at the bottom, as an 8-bit PNG."""
+    height, width = values.shape[:2]
+    image = bpy.data.images.new("Gridlight preview", width, height)
+    try:
+        pixels = np.ones((height, width, 4), np.float32)
+        pixels[..., :3] = values
+        image.pixels.foreach_set(pixels.reshape(-1))
+        image.filepath_raw = str(path)
+        image.file_format = "PNG"
+        image.save()
+    finally:
+        bpy.data.images.remove(image)
