@@ -74,6 +74,9 @@ class _Builder:
         self.put("Trim", plan.trim)
         self.put("Balustrades", plan.railings)
         self.put("Spiral stair", plan.stair)
+        for x in (-3.5, -1.75, 0.0, 1.75, 3.5):
+            for side, turn in ((1, NORTH), (-1, SOUTH)):
+                self.put("Wall panel", lambda: furnishing.wall_panel(1.35, 1.9), (x, side * plan.HALL_Y, 4.4), turn)
 
     def hang(self, painting: str, width: float, height: float, at, turn: float) -> None:
         self.put(painting, lambda: furnishing.picture_mesh(painting, width, height, self.materials), at, turn)
@@ -95,10 +98,10 @@ class _Builder:
         self.hang("Tide", 1.26, 1.8, (8.1, -wing, 1.7), SOUTH)
         self.hang("Tide", 1.26, 1.8, (-plan.WING_X1, 0.0, upper + 1.7), WEST)
         self.hang("Rings", 1.7, 1.7, (-8.1, wing, upper + 1.75), NORTH)
-        self.stand("Bronze knot", furnishing.knot, (-2.2, 0.0, 0), (0.7, 1.0), 0.5)
+        self.stand("Ultramarine knot", furnishing.knot, (-2.2, 0.0, 0), (0.7, 1.0), 0.5)
         self.stand("Turning column", furnishing.twisted_column, (2.9, 1.9, 0), (0.62, 0.55))
-        self.stand("Amphora", furnishing.amphora, (-5.75, -2.2, 0), (0.5, 0.9))
-        self.stand("Blue amphora", lambda: furnishing.amphora("Cobalt glaze"), (-5.75, 2.2, 0), (0.5, 0.9))
+        self.stand("Marble amphora", lambda: furnishing.amphora("Marble"), (-5.75, -2.2, 0), (0.5, 0.9))
+        self.stand("Celadon amphora", lambda: furnishing.amphora("Celadon"), (-5.75, 2.2, 0), (0.5, 0.9))
         self.stand("Spheres", furnishing.spheres, (6.2, -1.95, 0), (0.85, 0.8), 0.3)
         self.stand("Turning column", furnishing.twisted_column, (-8.0, 0.0, upper), (0.62, 0.55))
         self.stand("Amphora", furnishing.amphora, (7.0, -1.8, upper), (0.5, 0.9))
@@ -119,10 +122,10 @@ class _Builder:
         self.put("Cove lights", plan.cove_lights, group="wall")
 
     def lights(self) -> None:
-        self.put("Lay light frame", lambda: furnishing.lay_light(6.2, 1.7), (0, 0, 7.6))
-        self._area("Hall ceiling light", "ceiling1", (0, 0, 7.59), (6.0, 1.5), 420.0, (1.0, 0.95, 0.88))
-        self.put("Room light frame", lambda: furnishing.lay_light(1.9, 1.1), (-8.1, 0, 3.2))
-        self._area("Room ceiling light", "ceiling2", (-8.1, 0, 3.19), (1.7, 0.9), 75.0, (1.0, 0.90, 0.78))
+        self.put("Lay light frame", lambda: furnishing.lay_light(6.2, 1.7, 1.0), (0, 0, 7.6))
+        self._area("Hall ceiling light", "ceiling1", (0, 0, 7.59), (6.0, 1.5), 300.0, (1.0, 0.95, 0.88))
+        self.put("Room light frame", lambda: furnishing.lay_light(1.9, 1.1), (-8.1, 0, 3.24))
+        self._area("Room ceiling light", "ceiling2", (-8.1, 0, 3.23), (1.7, 0.9), 52.0, (1.0, 0.90, 0.78))
         lamp = bpy.data.lights.new("Wandering lamp", "POINT")
         lamp.energy, lamp.color, lamp.shadow_soft_size = 60.0, (1.0, 0.72, 0.42), 0.09
         thing = bpy.data.objects.new("Wandering lamp", lamp)
@@ -147,7 +150,7 @@ def _camera(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
     data = bpy.data.cameras.new("Gallery Camera")
     data.lens, data.clip_start, data.clip_end = 21.0, 0.05, 100.0
     camera = bpy.data.objects.new("Gallery Camera", data)
-    place, target = Vector((-10.7, -1.35, 1.62)), Vector((0.0, 0.35, 1.85))
+    place, target = Vector((-9.9, -1.1, 1.6)), Vector((0.0, 0.42, 2.0))
     camera.location = place
     camera.rotation_euler = (target - place).to_track_quat("-Z", "Y").to_euler()
     collection.objects.link(camera)

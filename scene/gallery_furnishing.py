@@ -13,9 +13,10 @@ import numpy as np
 from .gallery_shapes import Solid, box, lofted, sphere, spline, torus_knot, turned
 
 
-def frame(width: float, height: float, material: str = "Gilding") -> Solid:
-    """A moulded frame around a picture of ``width`` × ``height``."""
-    profile = np.array([(0.0, 0.0), (0.09, 0.0), (0.09, 0.035), (0.06, 0.06), (0.03, 0.05), (0.0, 0.03)])  # outwards, off the wall
+def frame(width: float, height: float, material: str = "Gilding", size: float = 1.0) -> Solid:
+    """A moulded frame around a picture of ``width`` × ``height``; ``size`` 1 is 9 cm wide and 6 cm deep."""
+    # outwards, off the wall
+    profile = size * np.array([(0.0, 0.0), (0.09, 0.0), (0.09, 0.035), (0.06, 0.06), (0.03, 0.05), (0.0, 0.03)])
     w, h = width / 2, height / 2
     sections = [np.stack([sx * (w + profile[:, 0]), -profile[:, 1], sz * (h + profile[:, 0])], axis=1)
                 for sx, sz in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
@@ -67,9 +68,15 @@ def bench() -> Solid:
     return solid
 
 
+def wall_panel(width: float, height: float) -> Solid:
+    """A painted field in a slim moulding, flat enough to be wall."""
+    w, h = width / 2, height / 2
+    return box((-w, -0.012, -h), (w, 0, h), "Panel") + frame(width, height, "Plaster", 0.5)
+
+
 def knot() -> Solid:
-    """A trefoil knot of bronze."""
-    return torus_knot(2, 3, 0.46, 0.105, 96, 10, "Bronze")
+    """A trefoil knot in ultramarine."""
+    return torus_knot(2, 3, 0.46, 0.105, 96, 10, "Ultramarine")
 
 
 def twisted_column() -> Solid:
@@ -87,13 +94,13 @@ def amphora(material: str = "Terracotta") -> Solid:
 def spheres() -> Solid:
     """Three touching marble balls, one on two."""
     solid = sphere(0.20, 3, "Marble").at(-0.2, 0, 0) + sphere(0.20, 3, "Marble").at(0.2, 0, 0)
-    return solid + sphere(0.16, 3, "Cobalt glaze").at(0, 0, 0.2 + np.sqrt(0.36**2 - 0.2**2) - 0.16)
+    return solid + sphere(0.16, 3, "Celadon").at(0, 0, 0.2 + np.sqrt(0.36**2 - 0.2**2) - 0.16)
 
 
-def lay_light(width: float, depth: float) -> Solid:
-    """The frame of a hanging luminous panel; its underside is z = 0."""
+def lay_light(width: float, depth: float, rods: float = 0.0) -> Solid:
+    """The frame of a luminous panel that hangs on ``rods`` metres; its underside is z = 0."""
     solid = box((-width / 2, -depth / 2, 0.0), (width / 2, depth / 2, 0.06), "Ceiling")
-    for x in (-width / 2 + 0.2, width / 2 - 0.2):
+    for x in (-width / 2 + 0.2, width / 2 - 0.2) if rods else ():
         for y in (-depth / 2 + 0.15, depth / 2 - 0.15):
-            solid = solid + turned([(0.012, 0.06), (0.012, 1.0)], "Iron", sides=6).at(x, y, 0)
+            solid = solid + turned([(0.012, 0.06), (0.012, 0.06 + rods)], "Iron", sides=6).at(x, y, 0)
     return solid

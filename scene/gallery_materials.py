@@ -15,8 +15,8 @@ from . import gallery_painting
 PLAIN = {
     "Plaster": (0.78, 0.76, 0.72),
     "Ceiling": (0.82, 0.81, 0.78),
-    "Crimson wall": (0.58, 0.045, 0.04),
-    "Teal wall": (0.02, 0.27, 0.32),
+    "Crimson wall": (0.52, 0.035, 0.035),
+    "Teal wall": (0.02, 0.33, 0.38),
     "Ochre wall": (0.72, 0.40, 0.05),
     "Green wall": (0.10, 0.40, 0.14),
     "Coffer": (0.32, 0.48, 0.66),
@@ -24,9 +24,10 @@ PLAIN = {
     "Walnut": (0.16, 0.085, 0.045),
     "Gilding": (0.70, 0.46, 0.13),
     "Marble": (0.82, 0.81, 0.79),
-    "Bronze": (0.30, 0.17, 0.07),
+    "Panel": (0.27, 0.43, 0.39),
+    "Ultramarine": (0.02, 0.05, 0.55),
     "Terracotta": (0.62, 0.24, 0.11),
-    "Cobalt glaze": (0.04, 0.10, 0.50),
+    "Celadon": (0.36, 0.55, 0.45),
     "Leather": (0.33, 0.12, 0.05),
     "Iron": (0.05, 0.05, 0.055),
     "Exterior": (0.45, 0.43, 0.40),
@@ -34,8 +35,9 @@ PLAIN = {
 
 # Emitted radiance, W/(m² sr).
 GLOWING = {
-    "Alabaster glow": (4.6, 3.1, 1.7),
-    "Cove glow": (3.6, 3.1, 2.5),
+    "Alabaster glow": (2.7, 1.95, 1.15),
+    "Cove glow": (3.6, 3.0, 2.3),
+    "Rail glow": (17.0, 14.0, 10.5),
 }
 
 PAINTED = {
