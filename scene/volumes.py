@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Probe volumes: those that stand in the scene as Empties, and one fitted to a scene that has none."""
+"""Probe volumes: those that stand in the scene as Empties, and (from ``volume_fit``) one for a scene that has none."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ import numpy as np
 from mathutils import Matrix
 
 from ..core.snapshot import Volume
+from .volume_fit import fit_volume, fitted_bounds
+
+__all__ = ["create_volume", "find_volumes", "fit_volume", "fitted_bounds"]
 
 MARK, RESOLUTION = "gridlight_volume", "gridlight_resolution"
 
