@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Direct light of Blender's lights at a diffuse surface: the readable twin of gpu_shaders/glsl/direct_light_lib.glsl.
+
+Units are those of ``core.snapshot.Light``; they are Blender's (Cycles manual, "Light Settings", and its source). Every light is an
+emitter of radiance L seen under a solid angle: irradiance is E = ∫ L cos θ dω, estimated as the mean over samples of
+(L · dω of the whole light as seen in the sample's direction) · cos θ · visible.
+
+N points, M light samples, float64.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .sampling import sample_r2
+from .snapshot import Light
+
+Visible = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""(origins (M, 3), unit directions (M, 3), distances (M,)) -> (M,) bool: nothing lies nearer than the distance."""
+
+_FULL_SPREAD = np.pi - 1e-4  # radians; from here on an area light's grid is taken as absent, as Blender's slider ends at 180°
+_LEAST_HALF_SPREAD = 1e-3  # radians
+_LEAST_BLEND = 1e-6  # of a spot's soft edge, in cosine
+_SHADOW_END = 0.9999  # of the distance to the light: the light's own surface casts no shadow
+
+
+@dataclass(frozen=True)
+class LightSamples:
+    """One sample of a light per point."""
+
+    directions: np.ndarray  # (N, 3) unit, towards the light
+    distances: np.ndarray  # (N,) metres, infinite for suns
+    irradiance: np.ndarray  # (N, 3) per unit cosine at the surface
+
+
+def irradiance(light: Light, points: np.ndarray, origins: np.ndarray, normals: np.ndarray, keys: np.ndarray, samples: int,
+               visible: Visible) -> np.ndarray:
+    """(N, 3) irradiance of ``light`` at ``points`` (N, 3) with unit ``normals`` (N, 3), world metres.
+
+    Shadow rays start at ``origins`` (N, 3), the points stepped off their surface; ``keys`` (N, 3) uint32 pick the samples. A light
+    without extent takes one sample whatever ``samples`` says.
+    """
+    total = np.zeros((len(points), 3))
+    count = 1 if is_sharp(light) else samples
+    for index in range(count):
+        sample = sample_light(light, points, sample_r2(keys, index).astype(float))
+        cosine = np.einsum("ni,ni->n", sample.directions, normals)
+        lit = (cosine > 0) & sample.irradiance.any(axis=1)
+        if light.casts_shadow:
+            lit[lit] = visible(origins[lit], sample.directions[lit], sample.distances[lit] * _SHADOW_END)
+        total += np.where(lit, cosine, 0.0)[:, None] * sample.irradiance
+    return total / count
+
+
+def is_sharp(light: Light) -> bool:
+    """Is one sample exact, because the light has no extent?"""
+    if light.kind == "SUN":
+        return light.angle == 0
+    return light.kind != "AREA" and light.radius == 0
+
+
+def sample_light(light: Light, points: np.ndarray, u: np.ndarray) -> LightSamples:
+    """The sample of ``light`` that numbers ``u`` (N, 2) in [0, 1) pick at each of ``points`` (N, 3)."""
+    if light.kind == "SUN":
+        return _sample_sun(light, u)
+    if light.kind == "AREA":
+        return _sample_area(light, points, u)
+    sample = _sample_point(light, points, u)
+    if light.kind == "SPOT":
+        mask = spot_mask(light, sample.directions)
+        return LightSamples(sample.directions, sample.distances, sample.irradiance * mask[:, None])
+    return sample
+
+
+def _sample_sun(light: Light, u: np.ndarray) -> LightSamples:
+    """Uniform in the cone of half the apparent angle α. Its radiance is strength/(π sin² α), so that a facing surface gets exactly
+    the strength: ∫ cos θ dω over the cone is π sin² α. Times the cone's solid angle 2π(1 − cos α) that is
+    strength · 2/(1 + cos α).
+    """
+    back = np.asarray(light.matrix, float)[:3, 2]
+    one_minus_cos = 1.0 - np.cos(light.angle / 2)
+    directions = _in_cone(np.broadcast_to(back, (len(u), 3)), one_minus_cos, u)
+    strength = np.asarray(light.color) * (2.0 / (2.0 - one_minus_cos))
+    return LightSamples(directions, np.full(len(u), np.inf), np.broadcast_to(strength, (len(u), 3)).copy())
+
+
+def _sample_area(light: Light, points: np.ndarray, u: np.ndarray) -> LightSamples:
+    """Uniform on the face of radiance L: dω = cos θ_light · area / distance². The face shines along −back only.
+
+    Spread below 180° puts a grid in front: the share of the face that is seen at the angle θ falls linearly in tan θ to zero at
+    half the spread and is normalised so that total power stays (Cycles, ``area_light_spread_attenuation``).
+    """
+    matrix = np.asarray(light.matrix, float)
+    right, up, back, centre = matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3]
+    is_ellipse = light.shape == "ELLIPSE"
+    place = 0.5 * _on_disk(u) if is_ellipse else u - 0.5
+    to_light = centre - points + place[:, :1] * light.size_x * right + place[:, 1:] * light.size_y * up
+    distances = np.linalg.norm(to_light, axis=1)
+    directions = to_light / np.maximum(distances, 1e-20)[:, None]
+    cosine = -directions @ back
+    area = light.size_x * light.size_y * (np.pi / 4 if is_ellipse else 1.0)
+    spread = np.ones(len(points))
+    if light.spread < _FULL_SPREAD:
+        half = max(light.spread / 2, _LEAST_HALF_SPREAD)
+        tangent = np.sqrt(np.maximum(1 - cosine * cosine, 0)) / np.maximum(cosine, 1e-6)
+        spread = np.maximum(np.tan(half) - tangent, 0) / (np.tan(half) - half)
+    factor = spread * np.maximum(cosine, 0) * area / np.maximum(distances * distances, 1e-20)
+    return LightSamples(directions, distances, factor[:, None] * np.asarray(light.color))
+
+
+def _sample_point(light: Light, points: np.ndarray, u: np.ndarray) -> LightSamples:
+    """Point and spot of radiant intensity I: I/d² without a radius, otherwise one of two shapes of radius r.
+
+    * Soft falloff, or a point within the radius: a disk of radiance I/(πr²) that faces the point.
+    * Else a sphere of radiance I/(πr²), uniform in the cone that it fills, sin² of whose half angle is r²/d².
+    """
+    colour, radius = np.asarray(light.color, float), light.radius
+    to_centre = np.asarray(light.matrix, float)[:3, 3] - points
+    squared = np.maximum(np.einsum("ni,ni->n", to_centre, to_centre), 1e-20)
+    centre_distance = np.sqrt(squared)
+    axis = to_centre / centre_distance[:, None]
+    if radius == 0:
+        return LightSamples(axis, centre_distance, colour / squared[:, None])
+
+    tangent, bitangent = tangent_frame(axis)
+    disk = radius * _on_disk(u)
+    to_disk = to_centre + disk[:, :1] * tangent + disk[:, 1:] * bitangent
+    disk_distance = np.linalg.norm(to_disk, axis=1)
+    # radiance × area × cos at the disk / distance², and cos at the disk is centre_distance / distance
+    disk_factor = centre_distance / disk_distance**3
+    if light.soft_falloff:
+        return LightSamples(to_disk / disk_distance[:, None], disk_distance, disk_factor[:, None] * colour)
+
+    inside = centre_distance <= radius
+    sine_squared = np.where(inside, 0.0, radius**2 / squared)
+    one_minus_cos = 1.0 - np.sqrt(1.0 - sine_squared)
+    directions = _in_cone(axis, one_minus_cos, u)
+    cosine = np.einsum("ni,ni->n", directions, axis)
+    depth = np.sqrt(np.maximum(radius**2 - squared * (1 - cosine**2), 0))
+    factor = np.where(inside, disk_factor, 2.0 * one_minus_cos / radius**2)
+    return LightSamples(
+        np.where(inside[:, None], to_disk / disk_distance[:, None], directions),
+        np.where(inside, disk_distance, centre_distance * cosine - depth),
+        factor[:, None] * colour)
+
+
+def spot_mask(light: Light, directions: np.ndarray) -> np.ndarray:
+    """(N,) share of a spot's light sent against ``directions`` (N, 3): smoothstep in the cosine, 1 inside, 0 outside the cone."""
+    cosine = np.cos(light.spot_size / 2)
+    width = max((1 - cosine) * light.spot_blend, _LEAST_BLEND)
+    x = np.clip((directions @ np.asarray(light.matrix, float)[:3, 2] - cosine) / width, 0, 1)
+    return x * x * (3 - 2 * x)
+
+
+def tangent_frame(n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors perpendicular to each of ``n`` (N, 3): Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 2017."""
+    x, y, z = n.T
+    s = np.where(z >= 0, 1.0, -1.0)
+    a = -1.0 / (s + z)
+    c = x * y * a
+    return np.stack([1 + s * x * x * a, s * c, -s * x], 1), np.stack([c, s + y * y * a, -y], 1)
+
+
+def _on_disk(u: np.ndarray) -> np.ndarray:
+    """(N, 2) points spread evenly over the unit disk."""
+    radius, angle = np.sqrt(u[:, 0]), 2 * np.pi * u[:, 1]
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+
+
+def _in_cone(axis: np.ndarray, one_minus_cos: np.ndarray | float, u: np.ndarray) -> np.ndarray:
+    """(N, 3) directions spread evenly over the cones around ``axis`` (N, 3) whose half angles have the cosine 1 − ``one_minus_cos``."""
+    tangent, bitangent = tangent_frame(axis)
+    cosine = 1.0 - u[:, 0] * one_minus_cos
+    sine, angle = np.sqrt(np.maximum(1 - cosine * cosine, 0)), 2 * np.pi * u[:, 1]
+    return (cosine[:, None] * axis + (sine * np.cos(angle))[:, None] * tangent + (sine * np.sin(angle))[:, None] * bitangent)

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rays against triangles: every pair tested (brute force), and a plain traversal of the hierarchy that counts its work.
+
+Readable twins of gpu_shaders/glsl/ray_lib.glsl in float64, for tests and measurements. N rays, T triangles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .bvh import NODE_TEXELS, WIDTH, Hierarchy
+
+IsHole = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""(triangles (K,), barycentric (K, 2)) -> (K,) bool: is the material clipped away there?"""
+
+_PAIRS_AT_ONCE = 1 << 20
+_STEP = 3.8e-6  # of a point's magnitude: 32 units in the last place of float32
+
+
+@dataclass
+class Hits:
+    """The nearest hit of each ray: ``triangle`` (N,) is −1 and ``distance`` (N,) infinite where nothing is hit;
+    ``barycentric`` (N, 2) are the weights of corners 1 and 2. ``distance`` is in lengths of the ray's direction."""
+
+    distance: np.ndarray
+    triangle: np.ndarray
+    barycentric: np.ndarray
+
+
+@dataclass
+class TraversalCost:
+    """What a traversal did per ray: nodes fetched (N,), triangles tested (N,) and the most entries its stack held (N,)."""
+
+    nodes: np.ndarray
+    triangles: np.ndarray
+    stack: np.ndarray
+
+
+def intersect(corners: np.ndarray, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distances (…) and barycentrics (…, 2) of rays (…, 3) against triangles ``corners`` (…, 3, 3); infinite where missed.
+
+    Leading shapes broadcast. Watertight and two-sided: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2013. The
+    triangle is sheared so that the ray runs along +z; the signs of three edge functions, which neighbours compute from the same
+    numbers, decide.
+    """
+    axis = np.argmax(np.abs(directions), axis=-1)
+    x, y, z = (axis + 1) % 3, (axis + 2) % 3, axis
+    depth = _component(directions, z)
+    shear_x, shear_y = _component(directions, x) / depth, _component(directions, y) / depth
+    a, b, c = (corners[..., i, :] - origins for i in range(3))
+    az, bz, cz = (_component(p, z) for p in (a, b, c))
+    (ax, ay), (bx, by), (cx, cy) = ((_component(p, x) - shear_x * pz, _component(p, y) - shear_y * pz)
+                                    for p, pz in ((a, az), (b, bz), (c, cz)))
+    u, v, w = cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax
+    determinant = u + v + w
+    inside = (np.minimum(u, np.minimum(v, w)) >= 0) | (np.maximum(u, np.maximum(v, w)) <= 0)
+    hit = inside & (determinant != 0)
+    safe = np.where(hit, determinant, 1.0)
+    distance = (u * az + v * bz + w * cz) / (depth * safe)
+    return np.where(hit & (distance > 0), distance, np.inf), np.stack([v / safe, w / safe], axis=-1)
+
+
+def _component(vectors: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """``vectors`` (…, 3) at ``axis`` (…), shapes broadcast."""
+    shape = np.broadcast_shapes(vectors.shape[:-1], axis.shape)
+    vectors = np.broadcast_to(vectors, (*shape, 3))
+    return np.take_along_axis(vectors, np.broadcast_to(axis, shape)[..., None], -1)[..., 0]
+
+
+def closest_hit(triangles: np.ndarray, origins: np.ndarray, directions: np.ndarray, is_hole: IsHole | None = None) -> Hits:
+    """Nearest hit of rays ``origins``, ``directions`` (N, 3) among ``triangles`` (T, 3, 3), all pairs tested."""
+    count = len(origins)
+    hits = Hits(np.full(count, np.inf), np.full(count, -1), np.zeros((count, 2)))
+    rays_at_once = max(1, _PAIRS_AT_ONCE // len(triangles))
+    for start in range(0, count, rays_at_once):
+        rays = slice(start, start + rays_at_once)
+        distance, barycentric = intersect(triangles[None], origins[rays, None], directions[rays, None])
+        if is_hole is not None:
+            ray, triangle = np.nonzero(np.isfinite(distance))
+            hole = is_hole(triangle, barycentric[ray, triangle])
+            distance[ray[hole], triangle[hole]] = np.inf
+        nearest = distance.argmin(axis=1)
+        row = np.arange(len(nearest))
+        hits.distance[rays] = distance[row, nearest]
+        hit = np.isfinite(hits.distance[rays])
+        hits.triangle[rays] = np.where(hit, nearest, -1)
+        hits.barycentric[rays] = np.where(hit[:, None], barycentric[row, nearest], 0.0)
+    return hits
+
+
+def any_hit(triangles: np.ndarray, origins: np.ndarray, directions: np.ndarray, limits: np.ndarray,
+            is_hole: IsHole | None = None) -> np.ndarray:
+    """(N,) bool: does each ray hit something nearer than its limit?"""
+    return closest_hit(triangles, origins, directions, is_hole).distance < limits
+
+
+def step_off(points: np.ndarray, normals: np.ndarray, towards: np.ndarray, distances: np.ndarray) -> np.ndarray:
+    """(N, 3) starts of secondary rays at hit ``points`` (N, 3), positions relative to the volume's centre.
+
+    The rounding error of a hit grows with its coordinates and with the ``distances`` (N,) of the ray that found it, so the step does
+    too. ``towards`` (N, 3) points back to where that ray came from.
+    """
+    magnitude = np.maximum(np.abs(points).max(axis=1), distances)
+    return points + (normals + towards) * (magnitude * _STEP)[:, None]
+
+
+def traverse(hierarchy: Hierarchy, triangles: np.ndarray, origins: np.ndarray,
+             directions: np.ndarray) -> tuple[Hits, TraversalCost]:
+    """Nearest hits through ``hierarchy``, built of ``triangles`` (T, 3, 3), with children entered nearest first; and the work done.
+
+    Every ray takes one step (a node or a leaf) per round, on a stack of ``hierarchy.stack_size`` entries as in the shader.
+    ``Hits.triangle`` counts as in ``triangles``, not in leaf order.
+    """
+    count = len(origins)
+    corners = np.asarray(triangles, float)[hierarchy.order]
+    boxes = hierarchy.nodes[:, :NODE_TEXELS - 1].reshape(-1, 2, 3, WIDTH).astype(float)
+    children = hierarchy.nodes[:, NODE_TEXELS - 1].astype(np.int64)
+    hits = Hits(np.full(count, np.inf), np.full(count, -1), np.zeros((count, 2)))
+    cost = TraversalCost(*(np.zeros(count, np.int64) for _ in range(3)))
+    stack = np.zeros((count, hierarchy.stack_size), np.int64)
+    stack_entry = np.zeros((count, hierarchy.stack_size))
+    top = np.zeros(count, np.int64)
+    item = np.zeros(count, np.int64)
+    active = np.arange(count)
+    with np.errstate(divide="ignore"):
+        inverse = 1.0 / np.where(np.abs(directions) < 1e-20, 1e-20, directions)
+    while len(active):
+        rays = active[item[active] >= 0]
+        cost.nodes[rays] += 1
+        node = item[rays]
+        planes = (boxes[node] - origins[rays, None, :, None]) * inverse[rays, None, :, None]
+        entry = np.maximum(planes.min(axis=1).max(axis=1), 0.0)
+        leave = np.minimum(planes.max(axis=1).min(axis=1), hits.distance[rays, None]) * 1.00000024
+        used = boxes[node, 0, 0] <= boxes[node, 1, 0]  # empty slots have inverted boxes
+        entry = np.where((entry <= leave) & used, entry, np.inf)
+        farthest_first = np.argsort(-entry, axis=1, kind="stable")
+        for slot in farthest_first.T:
+            distance = entry[np.arange(len(rays)), slot]
+            entered = np.isfinite(distance)
+            ray = rays[entered]
+            stack[ray, top[ray]] = children[node[entered], slot[entered]]
+            stack_entry[ray, top[ray]] = distance[entered]
+            top[ray] += 1
+        cost.stack[rays] = np.maximum(cost.stack[rays], top[rays])
+
+        rays = active[item[active] < 0]
+        index = -1 - item[rays]
+        while len(rays):
+            cost.triangles[rays] += 1
+            distance, barycentric = intersect(corners[index], origins[rays], directions[rays])
+            nearer = distance < hits.distance[rays]
+            hits.distance[rays[nearer]] = distance[nearer]
+            hits.triangle[rays[nearer]] = hierarchy.order[index[nearer]]
+            hits.barycentric[rays[nearer]] = barycentric[nearer]
+            more = ~hierarchy.leaf_end[index]
+            rays, index = rays[more], index[more] + 1
+
+        searching = active
+        found = []
+        while len(searching):  # pop until something is left that may still be nearer
+            searching = searching[top[searching] > 0]
+            top[searching] -= 1
+            item[searching] = stack[searching, top[searching]]
+            useful = stack_entry[searching, top[searching]] <= hits.distance[searching]
+            found.append(searching[useful])
+            searching = searching[~useful]
+        active = np.concatenate(found)
+    return hits, cost

@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The bake, readable and slow: capture → texel surfaces → direct light → iterations → field, in float64 with every ray tested against
+every triangle.
+
+Readable twin of the shaders capture_trace_comp, surface_resolve_comp with surface_lib, object_sightings_comp, probe_statistics_comp,
+lookup_weights_comp, direct_light_comp and light_iterate_comp; for scenes of some hundred triangles and a few probes. Two things are
+rounded as the GPU stores them, because no reference could come near otherwise: images and lookup weights are half floats.
+
+Texels of a probe count face by face, row by row: X = 6·face². P probes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import culling, dilation, lookup, rays
+from . import spherical_harmonics as sh
+from .conventions import ACTIVE, CULLED, DEPTH_EDGE, INVALID
+from .cubemap import direction_to_texel, octahedral_decode, texel_directions, texel_solid_angles
+from .direct_light import irradiance as light_irradiance
+from .field import Field
+from .grid import Grid
+from .images import sample_image
+from .orientation import flipped_objects
+from .sampling import light_keys
+from .settings import BakeSettings
+from .snapshot import NO_IMAGE, SceneSnapshot
+from .world_map import world_texels
+
+INVALID_SHARE = 0.5  # of the sphere showing back faces
+
+
+@dataclass
+class TexelSurfaces:
+    """What the texels of P probes see; see surface_resolve_comp.glsl. ``distance`` is infinite where a texel sees background,
+    whose radiance is then in ``emission``."""
+
+    distance: np.ndarray  # (P, X) metres
+    triangle: np.ndarray  # (P, X) int, −1 background
+    back: np.ndarray  # (P, X) bool: seen from behind
+    normal: np.ndarray  # (P, X, 3) shading normal on the viewer's side
+    albedo: np.ndarray  # (P, X, 3)
+    emission: np.ndarray  # (P, X, 3) radiance
+
+
+class ReferenceBake:
+    """One bake of ``snapshot`` into ``grid``, stage by stage, so that tests can compare each with the GPU's.
+
+    ``nodes`` (S,) are the grid nodes that capture; ``capture`` comes first, then ``field_statistics``, ``source`` and ``iterate``.
+    """
+
+    def __init__(self, snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings):
+        self.snapshot, self.grid, self.settings = snapshot, grid, settings
+        self.triangles = snapshot.triangle_positions - grid.center
+        self.directions = texel_directions(settings.face).reshape(-1, 3)
+        self.solid_angles = np.tile(texel_solid_angles(settings.face).ravel(), 6)
+        needed = settings.keep_all or culling.needed_nodes(grid, snapshot.triangle_positions)
+        self.state = np.where(np.broadcast_to(needed, grid.count), ACTIVE, CULLED).astype(np.uint8)
+        self.nodes = np.flatnonzero(self.state == ACTIVE)
+        self.positions = grid.positions()[self.nodes] - grid.center
+        clips = np.array([material.alpha_threshold > 0 for material in snapshot.materials])
+        self._clipped = clips[snapshot.material_index]
+
+    # Capture ----------------------------------------------------------------------------------------------------------------
+
+    def capture(self) -> TexelSurfaces:
+        """Texel surfaces of all probes."""
+        shape = (len(self.nodes), len(self.directions))
+        origins = np.repeat(self.positions, shape[1], axis=0)
+        directions = np.tile(self.directions, (shape[0], 1))
+        hits = rays.closest_hit(self.triangles, origins, directions, self._hole_test())
+        background = world_texels(self.snapshot.world, self.settings.face).reshape(-1, 3)
+        flat = self._resolve(hits, origins, directions)
+        missed = hits.triangle < 0
+        flat.emission[missed] = np.tile(background, (shape[0], 1))[missed]
+        return TexelSurfaces(*(value.reshape(*shape, *value.shape[1:]) for value in vars(flat).values()))
+
+    def _hole_test(self):
+        return self.is_hole if self._clipped.any() else None
+
+    def is_hole(self, triangle: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """(K,) bool: is the material of ``triangle`` (K,) clipped away at ``barycentric`` (K, 2)? Images at full resolution."""
+        hole = np.zeros(len(triangle), bool)
+        for index, material in enumerate(self.snapshot.materials):
+            here = np.flatnonzero((self.snapshot.material_index[triangle] == index) & self._clipped[triangle])
+            alpha = np.full(len(here), float(material.alpha))
+            if material.alpha_image != NO_IMAGE and len(here):
+                uv = _interpolate(self.snapshot.corner_uvs[triangle[here]], barycentric[here])
+                texel = sample_image(self.snapshot.images[material.alpha_image], uv, np.zeros(len(here)))
+                alpha *= texel[:, :3].mean(axis=1) if material.alpha_from_color else texel[:, 3]
+            hole[here] = alpha < material.alpha_threshold
+        return hole
+
+    def _resolve(self, hits: rays.Hits, origins: np.ndarray, directions: np.ndarray) -> TexelSurfaces:
+        """Surfaces of rays (N,); fields of rays that hit nothing are zero."""
+        count = len(origins)
+        surfaces = TexelSurfaces(hits.distance, hits.triangle, np.zeros(count, bool), *(np.zeros((count, 3)) for _ in range(3)))
+        hit = np.flatnonzero(hits.triangle >= 0)
+        triangle, barycentric, direction = hits.triangle[hit], hits.barycentric[hit], directions[hit]
+        corners = self.triangles[triangle]
+        edge = corners[:, 1:] - corners[:, :1]
+        geometric = np.cross(edge[:, 0], edge[:, 1])
+        facing = np.einsum("ni,ni->n", geometric, direction)
+        surfaces.back[hit] = facing > 0
+        normal = _interpolate(self.snapshot.corner_normals[triangle], barycentric)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        surfaces.normal[hit] = np.where(facing[:, None] > 0, -normal, normal)
+
+        # Width of what a texel covers on the surface, in uv: distance × angle, stretched by the slant, × uv units per metre.
+        area = np.linalg.norm(geometric, axis=1)
+        uv = _interpolate(self.snapshot.corner_uvs[triangle], barycentric)
+        slant = np.maximum(np.abs(facing) / area, 0.1)
+        footprint = hits.distance[hit] * (2.0 / self.settings.face) / np.sqrt(slant) * self._uv_per_metre()[triangle]
+        for index, material in enumerate(self.snapshot.materials):
+            here = np.flatnonzero(self.snapshot.material_index[triangle] == index)
+            albedo = np.tile(np.array(material.base_color, float) * material.diffuse_share, (len(here), 1))
+            emission = np.tile(np.array(material.emission, float), (len(here), 1))
+            if material.base_image != NO_IMAGE:
+                albedo *= sample_image(self.snapshot.images[material.base_image], uv[here], footprint[here])[:, :3]
+            if material.emission_image != NO_IMAGE:
+                emission *= sample_image(self.snapshot.images[material.emission_image], uv[here], footprint[here])[:, :3]
+            surfaces.albedo[hit[here]], surfaces.emission[hit[here]] = albedo, emission
+        return surfaces
+
+    def _uv_per_metre(self) -> np.ndarray:
+        """(T,) square root of a triangle's area in uv over its area in the world."""
+        edge = self.triangles[:, 1:] - self.triangles[:, :1]
+        uv_edge = self.snapshot.corner_uvs[:, 1:].astype(float) - self.snapshot.corner_uvs[:, :1]
+        uv_area = np.abs(np.linalg.det(uv_edge))
+        return np.sqrt(uv_area / np.maximum(np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1), 1e-30))
+
+    # Statistics -------------------------------------------------------------------------------------------------------------
+
+    def flipped_objects(self, surfaces: TexelSurfaces) -> np.ndarray:
+        """(objects,) bool: the vote of all probes on 8×8 texels of each face, see core/orientation.py."""
+        face = self.settings.face
+        at = (2 * np.arange(8) + 1) * face // 16
+        index = (np.arange(6)[:, None, None] * face + at[:, None]) * face + at
+        triangle = surfaces.triangle[:, index.ravel()]
+        seen = self.snapshot.object_index[triangle] + 1
+        sightings = np.where(triangle < 0, 0, np.where(surfaces.back[:, index.ravel()], -seen, seen))
+        return flipped_objects(sightings, max(len(self.snapshot.object_names), 1))
+
+    def back_face_share(self, surfaces: TexelSurfaces, flips: np.ndarray) -> np.ndarray:
+        """(P,) share of the sphere that shows back faces, objects in ``flips`` turned round."""
+        back = surfaces.back ^ flips[self.snapshot.object_index[surfaces.triangle]]
+        return (back & (surfaces.triangle >= 0)) @ self.solid_angles / (4 * np.pi)
+
+    def depth_moments(self, surfaces: TexelSurfaces) -> np.ndarray:
+        """(P, DEPTH_EDGE², 2) mean and mean square of clamped distance, 16 directions over one and a half texels each."""
+        step = (np.arange(4) - 1.5) * 0.375
+        column, row = np.meshgrid(np.arange(DEPTH_EDGE), np.arange(DEPTH_EDGE))
+        place = np.stack(np.broadcast_arrays(column[..., None, None] + 0.5 + step, row[..., None, None] + 0.5 + step[:, None]), -1)
+        uv = place.reshape(DEPTH_EDGE**2, 16, 2) * (2.0 / DEPTH_EDGE) - 1.0
+        for axis in (0, 1):  # past the edge of the map the sphere goes on where the edge is mirrored to
+            past = np.abs(uv[..., axis]) > 1
+            uv[..., 1 - axis] = np.where(past, -uv[..., 1 - axis], uv[..., 1 - axis])
+            uv[..., axis] = np.where(past, np.sign(uv[..., axis]) * 2 - uv[..., axis], uv[..., axis])
+        face, row, column = direction_to_texel(octahedral_decode(uv), self.settings.face)
+        texel = (face * self.settings.face + row) * self.settings.face + column
+        distance = np.minimum(surfaces.distance[:, texel], lookup.depth_clamp(self.grid))
+        return np.stack([distance.mean(axis=-1), (distance**2).mean(axis=-1)], axis=-1)
+
+    def field_statistics(self, surfaces: TexelSurfaces) -> Field:
+        """A dark field with states, validity and depth."""
+        share = self.back_face_share(surfaces, self.flipped_objects(surfaces))
+        field = Field.empty(self.grid, self.settings.bands)
+        field.state[:] = self.state
+        field.state[self.nodes[share > INVALID_SHARE]] = INVALID
+        field.validity[self.nodes] = 1 - share
+        field.depth[self.nodes] = self.depth_moments(surfaces)
+        return field
+
+    # Light ------------------------------------------------------------------------------------------------------------------
+
+    def points(self, surfaces: TexelSurfaces) -> np.ndarray:
+        """(P, X, 3) hit points relative to the grid's centre; the probe's own position for background."""
+        distance = np.where(surfaces.triangle >= 0, surfaces.distance, 0.0)
+        return self.positions[:, None] + self.directions * distance[..., None]
+
+    def source(self, surfaces: TexelSurfaces) -> np.ndarray:
+        """(P, X, 3) emission plus reflected direct light of all lights."""
+        probe, texel = np.nonzero((surfaces.triangle >= 0) & surfaces.albedo.any(axis=2))
+        points = self.points(surfaces)[probe, texel]
+        normals = surfaces.normal[probe, texel]
+        origins = rays.step_off(points, normals, -self.directions[texel], surfaces.distance[probe, texel])
+
+        def visible(starts, directions, limits):
+            return ~rays.any_hit(self.triangles, starts, directions, limits, self._hole_test())
+
+        incoming = np.zeros((len(points), 3))
+        for index, light in enumerate(self.snapshot.lights):
+            keys = light_keys(self.nodes[probe], texel, index, self.settings.seed)
+            centre = self.grid.center
+            incoming += light_irradiance(light, points + centre, origins, normals, keys, self.settings.samples, visible)
+        source = surfaces.emission.copy()
+        source[probe, texel] += surfaces.albedo[probe, texel] / np.pi * incoming
+        return source
+
+    def lookups(self, surfaces: TexelSurfaces, field: Field) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes (P, X, 8) and weights (P, X, 8) with which each texel's surface reads the field."""
+        points = self.points(surfaces).reshape(-1, 3) + self.grid.center
+        nodes, weights = lookup.lookup_weights(field, points, surfaces.normal.reshape(-1, 3))
+        stored = weights.astype(np.float16).astype(float)
+        shape = (*surfaces.triangle.shape, 8)
+        return nodes.reshape(shape), (stored / stored.sum(axis=1, keepdims=True)).reshape(shape)
+
+    def iterate(self, surfaces: TexelSurfaces, source: np.ndarray, field: Field, lookups) -> np.ndarray:
+        """(grid.count, K, 3) next coefficients: outgoing radiance of every texel, projected to SH; other nodes filled.
+
+        Outgoing radiance is source + albedo/π · max(0, irradiance of ``field``); ``lookups`` as returned by ``lookups``.
+        """
+        nodes, weights = lookups
+        outgoing = source.copy()
+        for slot in range(len(self.nodes)):  # one probe at a time bounds the memory
+            blended = np.einsum("xw,xwkc->xkc", weights[slot], field.coefficients[nodes[slot]].astype(float))
+            incoming = np.maximum(sh.irradiance(blended, surfaces.normal[slot]), 0)
+            outgoing[slot] += surfaces.albedo[slot] / np.pi * incoming
+        coefficients = np.zeros((self.grid.count, self.settings.bands**2, 3))
+        coefficients[self.nodes] = sh.project(outgoing, self.directions, self.solid_angles, self.settings.bands)
+        active = field.state == ACTIVE
+        return coefficients[dilation.nearest_active(self.grid, active)]
+
+
+def bake(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings) -> Field:
+    """The field after ``settings.bounces`` bounces, which must be given: the reference does not judge convergence."""
+    job = ReferenceBake(snapshot, grid, settings)
+    surfaces = job.capture()
+    field = job.field_statistics(surfaces)
+    source = job.source(surfaces)
+    lookups = job.lookups(surfaces, field)
+    field.coefficients = np.zeros((grid.count, settings.bands**2, 3))
+    for _ in range(settings.bounces + 1):
+        field.coefficients = job.iterate(surfaces, source, field, lookups)
+    field.coefficients = dilation.fill(grid, field.coefficients, field.state == ACTIVE)
+    return field
+
+
+def _interpolate(values: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+    """(N, C) blend of corner ``values`` (N, 3, C) by the weights of corners 1 and 2, (N, 2)."""
+    first = 1 - barycentric.sum(axis=1, keepdims=True)
+    return values[:, 0] * first + values[:, 1] * barycentric[:, :1] + values[:, 2] * barycentric[:, 1:]

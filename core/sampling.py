@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Seeded numbers of shadow samples: the readable twin of gpu_shaders/glsl/random_lib.glsl.
+
+A number depends on what is sampled (probe, texel, light, sample) and on nothing else, so any split of the work gives the same light.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+# Fractions of Roberts' R2 sequence: 1/ρ and 1/ρ² of the plastic number ρ, the real root of ρ³ = ρ + 1.
+R2_STEP = np.array([0.7548776662466927, 0.5698402909980532], np.float32)
+
+
+def pcg3d(keys: np.ndarray) -> np.ndarray:
+    """Hash of ``keys`` (…, 3) uint32 to (…, 3) uint32, arithmetic modulo 2³².
+
+    Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 2020, listing 16.
+    """
+    v = np.asarray(keys, np.uint32) * np.uint32(1664525) + np.uint32(1013904223)
+    v = _mix(v)
+    v ^= v >> np.uint32(16)
+    return _mix(v)
+
+
+def _mix(v: np.ndarray) -> np.ndarray:
+    x, y, z = np.moveaxis(v, -1, 0)
+    x = x + y * z
+    y = y + z * x
+    z = z + x * y
+    return np.stack([x, y, z], axis=-1)
+
+
+def sample_r2(keys: np.ndarray, index: int) -> np.ndarray:
+    """(…, 2) float32 numbers in [0, 1): sample ``index`` of the sequence that belongs to each of ``keys`` (…, 3) uint32.
+
+    The R2 sequence, two-dimensional and of low discrepancy, shifted by the hash modulo 1 (Cranley and Patterson 1976). Single
+    precision on purpose: the shader's numbers, to the last bit where the driver does not fuse the multiplication and addition.
+    """
+    start = (pcg3d(keys)[..., :2] >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
+    value = start + R2_STEP * np.float32(index)
+    return value - np.floor(value)
+
+
+def light_keys(nodes: np.ndarray, texels: np.ndarray, light: int, seed: int) -> np.ndarray:
+    """(…, 3) uint32 keys of the samples that texels (…) of probes at grid ``nodes`` (…) take of light number ``light``.
+
+    ``texels`` count face by face, row by row. The odd factor keeps light numbers apart for any seed.
+    """
+    last = np.uint32((light * 0x9E3779B9 + seed) & 0xFFFFFFFF)
+    nodes, texels = np.broadcast_arrays(np.asarray(nodes, np.uint32), np.asarray(texels, np.uint32))
+    return np.stack([nodes, texels, np.full_like(nodes, last)], axis=-1)
