@@ -12,10 +12,12 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
+from ..core.grid import Grid
 from . import gallery_furnishing as furnishing
 from . import gallery_plan as plan
 from .gallery_materials import gallery_materials
 from .gallery_shapes import Solid
+from .volumes import create_volume
 
 FIRST_FRAME, LAST_FRAME = 1, 250
 
@@ -39,7 +41,7 @@ def build_gallery(scene: bpy.types.Scene | None = None) -> bpy.types.Scene:
     builder.lamps()
     builder.lights()
     _camera(scene, builder.collection)
-    _volume(builder.collection)
+    _volume(scene)
     _scene_settings(scene)
     scene.view_layers[0].update()
     return scene
@@ -157,14 +159,10 @@ def _camera(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
     scene.camera = camera
 
 
-def _volume(collection: bpy.types.Collection) -> None:
+def _volume(scene: bpy.types.Scene) -> None:
     low, high = np.array(plan.VOLUME_LOW), np.array(plan.VOLUME_HIGH)
-    volume = bpy.data.objects.new("Gallery Volume", None)
-    volume.empty_display_type, volume.empty_display_size = "CUBE", 1.0
-    volume.location, volume.scale = (low + high) / 2, (high - low) / 2
-    volume["gridlight_volume"] = 1
-    volume["gridlight_resolution"] = plan.VOLUME_RESOLUTION
-    collection.objects.link(volume)
+    box = Grid.from_bounds(low, high, plan.VOLUME_RESOLUTION).matrix
+    create_volume(scene, "Gallery Volume", box, plan.VOLUME_RESOLUTION)
 
 
 def _scene_settings(scene: bpy.types.Scene) -> None:

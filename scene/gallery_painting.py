@@ -11,12 +11,15 @@ import bpy
 import numpy as np
 
 
+WHITEST = 0.92  # sRGB-encoded: 0.83 linear, about what white paint reflects
+
+
 def packed_image(name: str, pixels: np.ndarray) -> bpy.types.Image:
-    """A packed byte image of sRGB ``pixels`` (height, width, 3), row 0 at the bottom."""
+    """A packed byte image of sRGB ``pixels`` (height, width, 3), row 0 at the bottom; nothing in it is above WHITEST."""
     height, width = pixels.shape[:2]
     image = bpy.data.images.new(name, width, height, alpha=False)
     rgba = np.ones((height, width, 4), np.float32)
-    rgba[..., :3] = np.clip(pixels, 0, 1)
+    rgba[..., :3] = np.clip(pixels, 0, WHITEST)
     image.pixels.foreach_set(rgba.ravel())
     image.update()
     image.pack()

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import bmesh
-import bpy
+import bpy  # first, because the wheel brings bmesh with it
+import bmesh  # isort: skip
 import numpy as np
 
 TEXTURE_SIZE = 1.6  # metres of surface that one texture repeat covers
