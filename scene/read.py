@@ -153,7 +153,7 @@ def _add_mesh(harvest: _Harvest, item: bpy.types.Object, matrix: np.ndarray, nam
             notices.append(f"object '{name}': {arrays.not_finite} triangles have corners that are not finite and are left out; "
                            "clean the mesh up")
         if arrays.needles:
-            notices.append(f"object '{name}': {arrays.needles} triangles without area are left out")
+            notices.group("triangles without area are left out", f"{name} ({arrays.needles})")
     slots = _slot_materials(item, mesh)
     group_key = (key, *(material.as_pointer() if material else 0 for material in slots))
     group = harvest.groups.get(group_key)
