@@ -3,8 +3,9 @@
 
 Iterations are a geometric series: once one mode dominates, each change is r times the one before, and what is still to come is
 change · r/(1−r). That sum, not the last change, is held against the tolerance; a furnace with albedo 0.99 shows why: its changes are
-1 % of the field when 63 % of the light is still missing. Where the ratio has settled, the sum is added at once (Aitken's delta-squared
-process), which saves most iterations of bright rooms.
+1 % of the field when 63 % of the light is still missing. Where the changes have become parallel, the sum is added at once (Aitken's
+delta-squared process for vectors), which saves most iterations of bright rooms. Parallel matters: a mode that alternates
+in sign shrinks just as steadily and would be blown up.
 """
 
 from __future__ import annotations
@@ -12,8 +13,9 @@ from __future__ import annotations
 import math
 
 AUTO_LIMIT = 512
-_SETTLED = 0.02  # relative difference of two ratios that counts as settled
+_PARALLEL = 0.999  # least cosine between two changes for the tail to be added
 _MOST_RATIO = 0.9985  # above it the tail is too uncertain to add
+_ROUNDING = 5e-7  # relative change that is nothing but float32 rounding
 
 
 class Convergence:
@@ -22,53 +24,51 @@ class Convergence:
     def __init__(self, bounces: int | None, tolerance: float):
         self._bounces = bounces
         self._tolerance = tolerance
-        self._ratio = math.nan
-        self._since_extrapolation = 0
+        self._lengths: list[float] = []  # |change| of the iterations since the last extrapolation
         self.iterations = 0
         self.changes: list[float] = []  # relative change of the field per iteration
-        self.missing = math.inf  # estimated share of the energy still to come
+        self.missing = math.inf  # estimated share of the light still to come
         self.done = False
         self.converged = False
         self.reason = ""
 
-    def add(self, energy: float, change: float) -> float:
-        """Takes |field|² and |change|² of one iteration. Returns the factor to extrapolate by, 0 for none.
+    def add(self, energy: float, change: float, overlap: float) -> float:
+        """Takes |field|², |change|² and change · last change of one iteration. Returns the factor to extrapolate by, 0 for none.
 
         The first iteration gathers direct light and emission, each further one is a bounce.
         """
         self.iterations += 1
-        self._since_extrapolation += 1
+        self._lengths.append(math.sqrt(change))
         relative = math.sqrt(change / energy) if energy > 0 else 0.0
-        previous = self.changes[-1] if self.changes else math.nan
         self.changes.append(relative)
-        last_ratio, self._ratio = self._ratio, relative / previous if previous > 0 else math.nan
-        ratio = self._ratio
-        if relative == 0.0:
-            self.missing = 0.0
-        elif ratio < 1.0:
-            self.missing = relative * ratio / (1.0 - ratio)
+        ratio = self._ratio()
+        if relative < _ROUNDING:
+            self.missing = relative
         else:
-            self.missing = math.inf
-        settled = self._since_extrapolation >= 4 and abs(ratio - last_ratio) < _SETTLED * (1.0 - ratio)
-        enough = self.missing < self._tolerance and self._since_extrapolation >= 2
+            self.missing = relative * ratio / (1.0 - ratio) if ratio < 1.0 else math.inf
         bounces = self.iterations - 1
         if self._bounces is not None:
             self.done = bounces >= self._bounces
             self.converged = True
             self.reason = f"stopped after the {self._bounces} bounces asked for, {self.missing:.2g} of the light estimated missing"
-            return 0.0
-        if enough:
+        elif self.missing < self._tolerance:
             self.done = self.converged = True
             self.reason = (f"converged after {self.iterations} iterations: an estimated {self.missing:.2g} of the light is missing, "
                            f"tolerance {self._tolerance:g}")
-            return 0.0
-        if bounces >= AUTO_LIMIT:
+        elif bounces >= AUTO_LIMIT:
             self.done = True
             self.reason = (f"not converged after {AUTO_LIMIT} bounces: each still adds {ratio:.4f} of the one before; "
                            "surfaces that reflect all light never settle, lower their base colour")
-            return 0.0
-        if settled and 0.0 < ratio < _MOST_RATIO:
-            self._since_extrapolation = 0
-            self._ratio = math.nan
+        elif len(self._lengths) >= 3 and overlap > _PARALLEL * self._lengths[-1] * self._lengths[-2] and ratio < _MOST_RATIO:
+            self._lengths.clear()
             return ratio / (1.0 - ratio)
         return 0.0
+
+    def _ratio(self) -> float:
+        """By how much a change is smaller than the one before: over two steps where there are, so that alternation evens out."""
+        lengths = self._lengths
+        if len(lengths) >= 3 and lengths[-3] > 0:
+            return math.sqrt(lengths[-1] / lengths[-3])
+        if len(lengths) == 2 and lengths[-2] > 0:
+            return lengths[-1] / lengths[-2]
+        return math.inf

@@ -130,9 +130,9 @@ def bake_steps(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, repo
                 backend.iterate(batches.lit(index), read_field=convergence.iterations > 0)
             yield
         with _timed(result, "light"):
-            energy, change, band0 = backend.finish_iteration()
+            energy, change, overlap, band0 = backend.finish_iteration()
             result.energy.append(band0 / max(len(nodes), 1) * 0.28209479177387814)
-            factor = convergence.add(energy, change)
+            factor = convergence.add(energy, change, overlap)
             reporter.advance(1)
             if convergence.done:
                 break

@@ -89,9 +89,9 @@ class GpuBackend:
         self._probe_slots = upload(slots, "probes")
 
     def allocate_field(self) -> None:
-        """Two copies of the field (last and next iteration) and the statistics of the active probes, all zero."""
+        """The field of the last three iterations, newest first, and the statistics of the active probes, all zero."""
         elements = self.grid.count * self.coefficients
-        self._field = [allocate(elements, "field coefficients") for _ in range(2)]
+        self._field = [allocate(elements, "field coefficients") for _ in range(3)]
         self._moments = allocate(len(self._nodes) * DEPTH_EDGE**2, "depth statistics", "RG32F")
         self._shares = allocate(len(self._nodes), "probes")
 
@@ -229,7 +229,7 @@ class GpuBackend:
         self._dispatch_texels(shader, surfaces.count)
 
     def iterate(self, surfaces: Surfaces, read_field: bool) -> None:
-        """One light iteration of these probes: reads field 0, writes field 1."""
+        """One light iteration of these probes: reads the newest field and writes over the oldest."""
         shader = program("light_iterate_comp", FACE=self.face, BANDS=self.settings.bands,
                          COEFFICIENTS=self.coefficients, GROUP=_GROUP)
         shader.uniform_block("grid_info", self._grid_info)
@@ -238,17 +238,17 @@ class GpuBackend:
         shader.uniform_sampler("field_in", self._field[0])
         for name in ("geometry", "albedo", "source", "weights0", "weights1"):
             shader.uniform_sampler(name, surfaces.textures[name])
-        shader.image("field_out", self._field[1])
+        shader.image("field_out", self._field[-1])
         self._set_range(shader, surfaces)
         shader.uniform_int("read_field", (int(read_field),))
         gpu.compute.dispatch(shader, surfaces.count, 1, 1)
 
-    def finish_iteration(self) -> tuple[float, float, float]:
-        """Fills inactive nodes and makes the new field the current one.
+    def finish_iteration(self) -> tuple[float, float, float, float]:
+        """Fills inactive nodes and makes the field just written the newest.
 
-        Returns |field|², |change|² over active probes and the sum of band 0's luminance.
+        Returns sums over active probes: |field|², |change|², change · change before, luminance of band 0.
         """
-        self._field.reverse()
+        self._field.insert(0, self._field.pop())
         if self._inactive is not None:
             shader = program("field_fill_comp", COEFFICIENTS=self.coefficients)
             shader.uniform_sampler("inactive_nodes", self._inactive)
@@ -257,13 +257,12 @@ class GpuBackend:
             gpu.compute.dispatch(shader, -(-self._inactive_count * self.coefficients // 64), 1, 1)
         shader = program("field_change_comp", COEFFICIENTS=self.coefficients)
         shader.uniform_sampler("probe_slots", self._probe_slots)
-        shader.uniform_sampler("field_new", self._field[0])
-        shader.uniform_sampler("field_old", self._field[1])
+        for name, texture in zip(("field_new", "field_old", "field_older"), self._field):
+            shader.uniform_sampler(name, texture)
         shader.image("change", self._change)
         shader.uniform_int("slot_count", (len(self._nodes),))
         gpu.compute.dispatch(shader, 1, 1, 1)
-        energy, change, _, band0 = read(self._change, 1)[0].tolist()
-        return energy, change, band0
+        return tuple(read(self._change, 1)[0].tolist())
 
     def extrapolate(self, factor: float) -> None:
         """field += factor · (field − field of the iteration before)."""

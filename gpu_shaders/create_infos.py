@@ -156,7 +156,7 @@ def field_fill_comp(info, defines):
 
 
 def field_change_comp(info, defines):
-    _samplers(info, "probe_slots", "field_new", "field_old")
+    _samplers(info, "probe_slots", "field_new", "field_old", "field_older")
     _image(info, 0, "change")
     _ints(info, "slot_count")
     info.local_group_size(256, 1, 1)

@@ -90,6 +90,9 @@ class PreviewPass:
             return view, np.zeros((1, 4))
         marks = np.where(self._field.state == ACTIVE, np.arange(grid.count), np.where(self._field.state == CULLED, -1, -2))
         centres = np.concatenate([self._positions, marks[:, None]], axis=1)
-        nearest = np.argsort(np.linalg.norm(self._positions - eye, axis=1), kind="stable")[:_MOST_SPHERES]
-        view[4, :2] = 0.12 * grid.cell_size().min(), len(nearest)
+        radius = 0.08 * float(grid.cell_size().min())
+        distance = np.linalg.norm(self._positions - eye, axis=1)
+        distance[distance < 6 * radius] = np.inf  # one right before the camera would hide the picture
+        nearest = np.argsort(distance, kind="stable")[: min(_MOST_SPHERES, int(np.isfinite(distance).sum()))]
+        view[4, :2] = radius, len(nearest)
         return view, centres[nearest]

@@ -1,7 +1,7 @@
-/* How far two iterations are apart: sums over active probes.
+/* How far iterations are apart: sums over active probes of the last three fields.
  *
- * Dispatch: one group of 256 threads; fixed order of summation. Writes one texel: |new|², |new − old|², 0, luminance of
- * band 0.
+ * Dispatch: one group of 256 threads; fixed order of summation. Writes one texel: |new|², |new − old|²,
+ * (new − old)·(old − older), luminance of band 0.
  */
 
 SHARED_ vec4 partial_sums[256];
@@ -16,8 +16,10 @@ void main()
     int c = i - slot * COEFFICIENTS;
     int at = int(element(probe_slots, slot).w) * COEFFICIENTS + c;
     vec3 fresh = element(field_new, at).rgb;
-    vec3 change = fresh - element(field_old, at).rgb;
-    sum += vec4(dot(fresh, fresh), dot(change, change), 0.0, c == 0 ? dot(fresh, vec3(0.2126, 0.7152, 0.0722)) : 0.0);
+    vec3 old = element(field_old, at).rgb;
+    vec3 change = fresh - old;
+    vec3 last_change = old - element(field_older, at).rgb;
+    sum += vec4(dot(fresh, fresh), dot(change, change), dot(change, last_change), c == 0 ? dot(fresh, vec3(0.2126, 0.7152, 0.0722)) : 0.0);
   }
   partial_sums[lane] = sum;
   barrier();
