@@ -32,10 +32,10 @@ def write_previews(snapshot: SceneSnapshot, scene: SceneTextures, field: Field, 
     """
     camera = snapshot.camera or cameras.suggest(field, WIDTH / HEIGHT)
     renderer = PreviewPass(snapshot, scene, field)
-    for path, spheres in ((picture, False), (probes, True)):
-        radiance = renderer.render(camera, WIDTH, HEIGHT, _SAMPLES, spheres=spheres, should_stop=should_stop)
-        if radiance is None:
-            raise Cancelled("cancelled; nothing was written")
+    pictures = renderer.render(camera, WIDTH, HEIGHT, _SAMPLES, should_stop=should_stop)
+    if pictures is None:
+        raise Cancelled("cancelled; nothing was written")
+    for path, radiance in zip((picture, probes), pictures):
         save_png(path, standard_view(radiance, snapshot.exposure))
 
 

@@ -177,6 +177,7 @@ def preview_comp(info, defines):
     slot = _lookup(info, slot)
     _samplers(info, "lights", "field_in", "world_texels", "spheres", first=slot)
     _image(info, 0, "picture", access="READ+WRITE")
+    _image(info, 1, "probe_picture", access="READ+WRITE")
     info.uniform_buf(1, "vec4", "view_info[5]")
     _ints(info, "light_count", "sample_index", "show_direct")
     info.local_group_size(8, 8, 1)

@@ -14,7 +14,7 @@ from ..core.snapshot import SceneSnapshot
 from ..core.world_map import world_texels
 from .programs import program
 from .scene_textures import SceneTextures
-from .textures import upload
+from .textures import read, upload
 
 _BACKGROUND_FACE = 128  # texels: resolution of the world behind the scene
 _MOST_SPHERES = 2048  # per picture, nearest to the camera first
@@ -46,17 +46,18 @@ class PreviewPass:
         background[:, :3] = world_texels(snapshot.world, _BACKGROUND_FACE).reshape(-1, 3)
         self._background = upload(background, "texels")
 
-    def render(self, camera: Camera, width: int, height: int, samples: int, *, spheres: bool = False, direct: bool = True,
-               should_stop=lambda: False) -> np.ndarray | None:
-        """(height, width, 3) float32 linear radiance, row 0 at the bottom; None when ``should_stop`` said so.
+    def render(self, camera: Camera, width: int, height: int, samples: int, *, direct: bool = True,
+               should_stop=lambda: False) -> tuple[np.ndarray, np.ndarray] | None:
+        """The scene, and the scene with its probes as spheres lit by their own irradiance.
 
-        ``spheres`` adds the probes, lit by their own irradiance; ``direct`` False leaves the field's light alone.
+        Each (height, width, 3) float32 linear radiance, row 0 at the bottom; None when ``should_stop`` said so. ``direct`` False
+        shows the field's light alone.
         """
         shader = program("preview_comp", FACE=_BACKGROUND_FACE, BANDS=self._field.bands,
                          COEFFICIENTS=self._field.bands**2, **self._scene.surface_defines,
                          STACK_SIZE=self._scene.hierarchy.stack_size)
-        picture = gpu.types.GPUTexture((width, height), format="RGBA32F")
-        view, centres = self._view(camera, spheres)
+        pictures = [gpu.types.GPUTexture((width, height), format="RGBA32F") for _ in range(2)]
+        view, centres = self._view(camera)
         view_info = gpu.types.GPUUniformBuf(gpu.types.Buffer("FLOAT", view.size, view.reshape(-1)))
         sphere_texture = upload(centres, "spheres")
         for index in range(samples):
@@ -69,25 +70,22 @@ class PreviewPass:
                 shader.uniform_sampler(name, texture)
             shader.uniform_block("grid_info", self._grid_info)
             shader.uniform_block("view_info", view_info)
-            shader.image("picture", picture)
+            shader.image("picture", pictures[0])
+            shader.image("probe_picture", pictures[1])
             shader.uniform_int("light_count", (self._scene.light_count,))
             shader.uniform_int("sample_index", (index,))
             shader.uniform_int("show_direct", (int(direct),))
             gpu.compute.dispatch(shader, -(-width // 8), -(-height // 8), 1)
-        buffer = picture.read()
-        buffer.dimensions = width * height * 4
-        values = np.frombuffer(buffer, np.float32).reshape(height, width, 4)
-        return values[..., :3] / values[..., 3:]
+        sums = [read(picture, width * height).reshape(height, width, 4) for picture in pictures]
+        return tuple(values[..., :3] / values[..., 3:] for values in sums)
 
-    def _view(self, camera: Camera, spheres: bool) -> tuple[np.ndarray, np.ndarray]:
+    def _view(self, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
         """The view_info block (5, 4) and sphere centres (S, 4)."""
         grid = self._field.grid
         view = np.zeros((5, 4), np.float32)
         eye = camera.position - grid.center
         view[0] = (*eye, camera.orthographic)
         view[1, :3], view[2, :3], view[3, :3] = camera.right, camera.up, camera.forward
-        if not spheres:
-            return view, np.zeros((1, 4))
         marks = np.where(self._field.state == ACTIVE, np.arange(grid.count), np.where(self._field.state == CULLED, -1, -2))
         centres = np.concatenate([self._positions, marks[:, None]], axis=1)
         radius = 0.08 * float(grid.cell_size().min())

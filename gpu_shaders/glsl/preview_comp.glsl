@@ -1,6 +1,7 @@
-/* The scene as the field lights it: camera rays, direct light and the field's lookup at what they hit, optionally probe spheres.
+/* The scene as the field lights it: camera rays, direct light and the field's lookup at what they hit, and probe spheres.
  *
- * Dispatch: x, y = pixels, one sample a pixel; groups of 8×8×1. Adds to `picture` (linear radiance); sample_index 0 overwrites.
+ * Dispatch: x, y = pixels, one sample a pixel; groups of 8×8×1. Adds linear radiance to `picture` and, with the probes as spheres in
+ * it, to `probe_picture`; sample_index 0 overwrites.
  * view_info: camera position, 1 if orthographic | right and up axes scaled to the edge of the image | forward |
  *            sphere radius, sphere count
  * spheres, 1 element each: centre, node of the grid (≥ 0: shaded with that node's irradiance; −1 culled, −2 invalid)
@@ -76,13 +77,8 @@ void main()
   vec3 direction = normalize(view_info[3].xyz + (orthographic ? vec3(0.0) : across));
 
   Hit hit = trace_closest(origin, direction);
-  int sphere;
-  float sphere_distance = intersect_spheres(origin, direction, sphere);
   vec3 radiance;
-  if (sphere_distance < hit.distance) {
-    radiance = shade_sphere(sphere, origin + direction * sphere_distance);
-  }
-  else if (hit.triangle < 0) {
+  if (hit.triangle < 0) {
     ivec2 texel = direction_texel(direction);
     radiance = element(world_texels, texel.y * FACE + texel.x).rgb;
   }
@@ -93,4 +89,12 @@ void main()
   }
   vec4 before = sample_index == 0 ? vec4(0.0) : imageLoad(picture, pixel);
   imageStore(picture, pixel, before + vec4(radiance, 1.0));
+
+  int sphere;
+  float sphere_distance = intersect_spheres(origin, direction, sphere);
+  if (sphere_distance < hit.distance) {
+    radiance = shade_sphere(sphere, origin + direction * sphere_distance);
+  }
+  before = sample_index == 0 ? vec4(0.0) : imageLoad(probe_picture, pixel);
+  imageStore(probe_picture, pixel, before + vec4(radiance, 1.0));
 }
