@@ -6,6 +6,7 @@ without touching ``sys.path``.
 """
 
 import importlib.util
+import signal
 import sys
 from pathlib import Path
 
@@ -22,6 +23,8 @@ def load_package():
 
 
 if __name__ == "__main__":
+    # A shell starts background jobs with this one ignored; `kill -INT` is meant to work on them too.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         load_package()
         from gridlight.cli.main import main

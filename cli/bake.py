@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.errors import InputError
+from ..core.errors import Cancelled, InputError
 from ..core.grid import Grid
 from ..core.settings import CAPTURES, BakeSettings
 from ..core.snapshot import Volume
@@ -70,8 +70,12 @@ def check(args) -> None:
         raise InputError("--min and --max belong together; give both or neither")
     if args.resolution and args.spacing:
         raise InputError("--resolution and --spacing exclude each other; give one")
-    if args.min and not (args.resolution or args.spacing):
-        raise InputError("--min and --max need --resolution NX,NY,NZ or --spacing M")
+    if args.min is not None:
+        if not (args.resolution or args.spacing):
+            raise InputError("--min and --max need --resolution NX,NY,NZ or --spacing M")
+        choose_grids(args, None)
+    elif args.resolution:
+        Grid(np.eye(4), args.resolution)
     if args.file is not None and not Path(args.file).exists():
         raise InputError(f"{args.file}: no such file")
 
@@ -95,8 +99,12 @@ def run(args, reporter, should_stop):
             snapshot = read_scene(scene)
         pipeline.check_snapshot(snapshot, reporter)
         grids = choose_grids(args, snapshot)
+        if should_stop():
+            raise Cancelled("cancelled")
         pipeline.start_gpu(reporter, stopwatch)
-        return pipeline.bake_volumes(snapshot, grids, settings, folder, reporter, should_stop, stopwatch)
+        results = pipeline.bake_volumes(snapshot, grids, settings, reporter, should_stop, stopwatch)
+        title = Path(args.file or bpy.data.filepath or scene.name).name
+        return pipeline.write_results(title, snapshot, settings, results, folder, reporter, should_stop, stopwatch)
 
 
 def choose_grids(args, snapshot) -> list[Grid]:
@@ -105,18 +113,20 @@ def choose_grids(args, snapshot) -> list[Grid]:
     ``--resolution`` and ``--spacing`` also apply to volumes of the file.
     """
     if args.min is not None:
-        volumes = [Volume("volume", Grid.from_bounds(args.min, args.max, (1, 1, 1)).matrix, args.resolution or (1, 1, 1))]
+        box = Grid.from_bounds(args.min, args.max, (1, 1, 1))
+        volumes = [Volume(box.name, box.matrix, box.resolution)]
     elif snapshot.volumes:
         volumes = snapshot.volumes
     else:
-        from ..scene.volumes import fit_volume
+        from ..scene.volume_fit import fit_volume
 
-        volumes = [fit_volume(snapshot)]
-    grids = []
-    for volume in volumes:
-        resolution = args.resolution or volume.resolution
-        if args.spacing is not None:
-            extent = 2 * np.linalg.norm(volume.matrix[:3, :3], axis=0)
-            resolution = tuple(int(count) for count in np.minimum(np.rint(extent / args.spacing), 10**6) + 1)
-        grids.append(Grid(volume.matrix, resolution, volume.name))
-    return grids
+        return [fit_volume(snapshot, args.spacing, args.resolution)]
+    return [Grid(volume.matrix, _resolution(args, volume), volume.name) for volume in volumes]
+
+
+def _resolution(args, volume: Volume) -> tuple[int, int, int]:
+    if args.spacing is None:
+        return args.resolution or volume.resolution
+    extent = 2 * np.linalg.norm(volume.matrix[:3, :3], axis=0)
+    cells = np.rint(np.minimum(extent / args.spacing, 1e6))  # Grid refuses what is too many, in plain numbers
+    return tuple(int(count) + 1 for count in cells)

@@ -3,20 +3,24 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 import time
 from contextlib import contextmanager
 
+import bpy
 import numpy as np
 
+from ..bake.job import BakeResult, run_bake
+from ..bake.preview import write_previews
 from ..core.conventions import ACTIVE, CULLED, INVALID
 from ..core.errors import InputError
 from ..core.grid import Grid
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..formats import probe_file, probe_metadata
+from ..formats.report import ReportData, VolumeReport, write_report
 from ..formats.staging import StagedFolder
+from ..gpu_shaders.context import device_description, ensure_context
 from . import worker
 
 PHASES = ("setup", "read", "cull", "capture", "light", "write", "total")
@@ -48,9 +52,7 @@ class Stopwatch:
 
 
 def start_gpu(reporter, stopwatch: Stopwatch) -> None:
-    """Makes the GPU context and says so to the parent process. Before 5.2 this needs a session that nothing is open in."""
-    from ..gpu_shaders.context import ensure_context
-
+    """Makes the GPU context and says so to the parent process."""
     reporter.phase("GPU context")
     with stopwatch.measure("setup"):
         ensure_context()
@@ -65,46 +67,58 @@ def check_snapshot(snapshot: SceneSnapshot, reporter) -> None:
         reporter.warn(warning)
 
 
-def bake_volumes(snapshot: SceneSnapshot, grids: list[Grid], settings: BakeSettings, folder: StagedFolder, reporter, should_stop,
-                 stopwatch: Stopwatch) -> tuple[dict, int]:
-    """Bakes ``grids`` and stages probe files, pictures and report in ``folder``. Returns (summary, exit status)."""
-    from ..bake.job import run_bake
-    from ..gpu_shaders.context import device_description
-
+def bake_volumes(snapshot: SceneSnapshot, grids: list[Grid], settings: BakeSettings, reporter, should_stop,
+                 stopwatch: Stopwatch) -> list[BakeResult]:
+    """Bakes ``grids`` one after the other."""
     for grid in grids:
         probe_file.check_size(grid, settings.bands)
-    device = device_description()
     results = []
     for grid in grids:
+        if len(grids) > 1:
+            reporter.note(f"volume '{grid.name}'")
         result = run_bake(snapshot, grid, settings, reporter, should_stop)
-        stopwatch.add({phase: value for phase, value in result.seconds.items() if phase in PHASES and phase != "total"})
+        stopwatch.add(result.seconds)
         for warning in result.warnings:
             reporter.warn(warning)
         for note in result.notes:
             reporter.note(note)
+        if not result.converged:
+            reporter.warn(f"{grid.name}: the light has not settled after {result.iterations} iterations; the files are "
+                          "written and marked. Raise --bounces or --tolerance, or darken materials that reflect everything")
         results.append(result)
+    return results
+
+
+def write_results(title: str, snapshot: SceneSnapshot, settings: BakeSettings, results: list[BakeResult],
+                  folder: StagedFolder, reporter, should_stop, stopwatch: Stopwatch) -> tuple[dict, int]:
+    """Stages probe files, pictures and report in ``folder``. Returns (summary, exit status)."""
+    device = device_description()
+    names = volume_names([result.field.grid for result in results])
+    images = []
     with stopwatch.measure("write"):
         reporter.phase("write")
-        for name, result in zip(file_names(grids), results):
+        for name, result in zip(names, results):
             result.field.metadata = {**result.field.metadata, **probe_metadata.provenance(
                 snapshot, settings, device, result.iterations, result.converged, reporter.warnings)}
-            probe_file.write(folder.path(name), result.field)
-        if importlib.util.find_spec("..bake.preview", __package__):  # until it lands
-            from ..bake.preview import write_previews
-
-            write_previews(snapshot, [result.field for result in results], folder.path("preview.png"),
-                           folder.path("preview_probes.png"))
+            probe_file.write(folder.path(f"probes{name}.exr"), result.field)
+        reporter.phase("pictures", len(results))
+        for name, result in zip(names, results):
+            pictures = folder.path(f"preview{name}.png"), folder.path(f"preview_probes{name}.png")
+            write_previews(snapshot, result.scene, result.field, *pictures, should_stop)
+            volume = result.field.grid.name
+            images += [(f"{volume}: direct light and field", pictures[0].read_bytes()),
+                       (f"{volume}: probes", pictures[1].read_bytes())]
+            reporter.advance()
     summary = _summary(results, device, settings, stopwatch, reporter)
-    if importlib.util.find_spec("..formats.report", __package__):  # until it lands
-        from ..formats.report import write_report
-
-        write_report(folder.path("report.html"), snapshot, settings, results, summary, preview=folder.staged("preview.png"))
-    summary["files"] = [str(folder.folder / name) for name in folder.names]
-    converged = all(result.converged for result in results)
-    if not converged:
-        reporter.warn("the light did not settle within the limit; the files are written and marked. Raise --bounces or "
-                      "--tolerance, or lower the reflectance of materials close to 1")
-    return summary, 0 if converged else NOT_CONVERGED
+    report = ReportData(
+        title=title, settings=settings.as_dict(), device=device, blender=bpy.app.version_string,
+        generator=f"Gridlight {probe_metadata.program_version()}", counts=summary["probes"], seconds=summary["seconds"],
+        warnings=reporter.warnings, images=images, summary=summary,
+        volumes=[VolumeReport(result.field, result.field.grid.name, result.energy, result.change, result.iterations,
+                              result.converged, result.notes) for result in results])
+    summary["files"] = [str(folder.folder / name) for name in [*folder.names, "report.html"]]
+    write_report(folder.path("report.html"), report)
+    return summary, 0 if summary["converged"] else NOT_CONVERGED
 
 
 def _summary(results, device: str, settings: BakeSettings, stopwatch: Stopwatch, reporter) -> dict:
@@ -122,10 +136,13 @@ def _summary(results, device: str, settings: BakeSettings, stopwatch: Stopwatch,
     }
 
 
-def file_names(grids: list[Grid]) -> list[str]:
-    """``probes.exr`` for one volume, ``probes_<name>.exr`` for several: safe on every file system, and all different."""
+def volume_names(grids: list[Grid]) -> list[str]:
+    """What tells the files of several volumes apart, ``_<name>`` each: safe on every file system, all different.
+
+    Nothing for a single volume, whose files are ``probes.exr`` and so on.
+    """
     if len(grids) == 1:
-        return ["probes.exr"]
+        return [""]
     names = []
     taken = set()
     for grid in grids:
@@ -135,5 +152,5 @@ def file_names(grids: list[Grid]) -> list[str]:
             number += 1
             name = f"{stem}_{number}"
         taken.add(name.casefold())
-        names.append(f"probes_{name}.exr")
+        names.append(f"_{name}")
     return names

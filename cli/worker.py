@@ -26,6 +26,7 @@ from . import system_libraries
 DESCRIPTORS = "GRIDLIGHT_WORKER_DESCRIPTORS"
 CONTEXT_READY = "context"
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
+PATIENCE_SECONDS = 3.0  # a step of the bake on a slow device may take longer
 LOG_TAIL = 4000  # characters of Blender's chatter worth showing after a crash
 
 _status_descriptor: int | None = None
@@ -98,7 +99,7 @@ def run_in_child(argv: list[str], say, needs_gpu: bool, verbose: bool) -> tuple[
             pass_fds=(status_write, log.fileno(), alive_read), stdin=subprocess.DEVNULL, process_group=0)
         os.close(status_write)
         os.close(alive_read)
-        interrupts = _forward_interrupts(child, say)
+        interrupts = _forward_interrupts(child)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, INTERRUPTS)
         code = child.wait()
         os.close(alive_write)
@@ -113,21 +114,29 @@ def run_in_child(argv: list[str], say, needs_gpu: bool, verbose: bool) -> tuple[
     if interrupts:
         say("cancelled")
         return 130, child.pid
-    if chatter and not verbose:
+    before_context = needs_gpu and CONTEXT_READY not in milestones
+    if chatter and not verbose and not before_context:
         print(chatter[-LOG_TAIL:], file=sys.stderr)
-    say(_death_line(-code, needs_gpu and CONTEXT_READY not in milestones))
+    say(_death_line(-code, before_context))
     return 3, child.pid
 
 
-def _forward_interrupts(child, say) -> list[int]:
-    """Hands interrupts on to the child, a second one kills it. Returns the list that collects them."""
+def _forward_interrupts(child) -> list[int]:
+    """Hands the first interrupt on to the child; a second one, or its patience running out, kills it.
+
+    Killing is safe: results take their names only when all are written. Returns the list that collects the interrupts.
+    """
     received = []
 
     def forward(number, _frame):
         received.append(number)
         if len(received) == 1:
-            say("stopping at the end of this step; once more stops at once")
-        child.send_signal(signal.SIGINT if len(received) == 1 else signal.SIGKILL)
+            child.send_signal(signal.SIGINT)
+            patience = threading.Timer(PATIENCE_SECONDS, child.kill)
+            patience.daemon = True
+            patience.start()
+        else:
+            child.kill()
 
     for number in INTERRUPTS:
         signal.signal(number, forward)
@@ -140,6 +149,6 @@ def _death_line(number: int, before_context: bool) -> str:
         return "the baking process was killed, most likely for lack of memory; use a lower --memory or --resolution"
     if before_context:
         drivers = system_libraries.install_command(["libegl1", "libegl-mesa0", "libgl1", "libgl1-mesa-dri"])
-        return (f"no usable GPU context: Blender ended with {name} while it made one; install a GPU driver or Mesa's software "
-                f"driver ({drivers})")
+        return (f"no usable GPU context: Blender ended with {name} while it made one (--verbose shows its words); "
+                f"install a GPU driver or Mesa's software driver: {drivers}")
     return f"Blender ended with {name} in its GPU driver or its own code; the lines above (or --verbose) say where"

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where ``verify`` asks for the light: nodes, random free points and random surface points, none inside a solid."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..core.errors import InputError
+from ..core.grid import Grid
+from ..core.orientation import flipped_objects
+from ..core.snapshot import SceneSnapshot
+
+SIX_NORMALS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
+
+_RAYS = 128  # that decide whether a point is inside a solid
+_FREE_SHARE = 0.25  # of back faces in sight that a free point may have
+_CLEARANCE = 0.02  # of a cell's shortest edge between a free point and the nearest surface
+_LIFT = 2e-3  # of a cell's shortest edge between a surface point and its surface
+_TRIES = 200  # candidates per point that is asked for
+
+
+class FreeSpace:
+    """Tells free space from the inside of solids, by rays against the scene's triangles: back faces all around mean inside.
+
+    Objects that free space sees from behind, such as a room made of a cube, count as inside out; the points that are asked for vote
+    on it together, as in ``core.orientation``.
+    """
+
+    def __init__(self, snapshot: SceneSnapshot):
+        from mathutils.bvhtree import BVHTree
+
+        self.snapshot = snapshot
+        # Blender's tree is single precision: rays start from the middle of the scene, not from the world's origin.
+        low, high = snapshot.bounds()
+        self._origin = (low + high) / 2
+        self._tree = BVHTree.FromPolygons((snapshot.vertices - self._origin).tolist(), snapshot.triangles.tolist(), all_triangles=True)
+        self._flipped: np.ndarray | None = None
+
+    def is_free(self, points: np.ndarray, clearance_m: float = 0.0) -> np.ndarray:
+        """(N,) bool for world ``points`` (N, 3). The first call decides which objects are inside out."""
+        seen = self._sightings(points)
+        if self._flipped is None:
+            self._flipped = flipped_objects(seen, max(len(self.snapshot.object_names), 1))
+        item = np.abs(seen) - 1
+        behind = (seen != 0) & ((seen < 0) != self._flipped[item])
+        free = behind.mean(axis=1) <= _FREE_SHARE
+        if clearance_m > 0:
+            near = [self._tree.find_nearest(point, clearance_m)[0] is not None for point in (points - self._origin).tolist()]
+            free &= ~np.array(near, bool)
+        return free
+
+    def _sightings(self, points: np.ndarray) -> np.ndarray:
+        """(N, _RAYS) int: ±(object + 1) that each ray meets, negative from behind, 0 for the sky."""
+        directions = _spiral(_RAYS)
+        seen = np.zeros((len(points), _RAYS), np.int64)
+        objects = self.snapshot.object_index
+        for row, point in enumerate((points - self._origin).tolist()):
+            for column, direction in enumerate(directions.tolist()):
+                _, normal, triangle, _ = self._tree.ray_cast(point, direction)
+                if triangle is not None:
+                    front = sum(a * b for a, b in zip(normal, direction)) < 0
+                    seen[row, column] = (1 if front else -1) * (int(objects[triangle]) + 1)
+        return seen
+
+
+def free_points(space: FreeSpace, grid: Grid, count: int, seed: int) -> np.ndarray:
+    """(count, 3) random free points, uniform in the box of ``grid``, world metres.
+
+    Raises:
+        InputError: the box has hardly any free space.
+    """
+    random = np.random.default_rng(seed)
+    clearance = _CLEARANCE * float(grid.cell_size().min())
+    found = np.empty((0, 3))
+    for _ in range(_TRIES):
+        local = random.uniform(-1, 1, (max(count, 64), 3))
+        points = local @ grid.matrix[:3, :3].T + grid.matrix[:3, 3]
+        found = np.concatenate([found, points[space.is_free(points, clearance)]])
+        if len(found) >= count:
+            return found[:count]
+    raise InputError(f"{grid.name}: its box holds hardly any free space; move it out of solid geometry")
+
+
+def surface_points(space: FreeSpace, grid: Grid, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Random points on the lit side of surfaces inside the box of ``grid``, uniform by area.
+
+    Returns (points, normals), each (M, 3) with M ≤ count: fewer where little surface has a free side.
+    """
+    random = np.random.default_rng(seed)
+    corners = space.snapshot.triangle_positions
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(cross, axis=1)
+    to_box = np.linalg.inv(grid.matrix)
+    lift = _LIFT * float(grid.cell_size().min())
+    points, normals = np.empty((0, 3)), np.empty((0, 3))
+    for _ in range(_TRIES):
+        chosen = random.choice(len(area), max(count, 64), p=area / area.sum())
+        u, v = random.uniform(size=(2, len(chosen), 1))
+        u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+        at = corners[chosen, 0] * (1 - u - v) + corners[chosen, 1] * u + corners[chosen, 2] * v
+        inside = (np.abs(at @ to_box[:3, :3].T + to_box[:3, 3]) <= 1).all(axis=1)
+        normal = cross[chosen] / area[chosen][:, None]
+        normal *= random.choice([-1.0, 1.0], (len(chosen), 1))  # both sides of open surfaces are lit
+        at, normal = (at + lift * normal)[inside], normal[inside]
+        if len(at):
+            free = space.is_free(at)
+            points, normals = np.concatenate([points, at[free]]), np.concatenate([normals, normal[free]])
+        if len(points) >= count:
+            break
+    return points[:count], normals[:count]
+
+
+def _spiral(count: int) -> np.ndarray:
+    """(count, 3) unit directions spread evenly: a Fibonacci spiral (González, Mathematical Geosciences 42, 2010)."""
+    index = np.arange(count) + 0.5
+    z = 1 - 2 * index / count
+    angle = np.pi * (3 - np.sqrt(5)) * index
+    radius = np.sqrt(1 - z * z)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
