@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a socket of a material evaluates to, rendered by Cycles on a unit square.
 
-The square lies at z = 0 with corners (±½, ±½); its UVs and Generated coordinates run from 0 to 1. Nodes that have no counterpart
-here, procedural textures above all, are answered this way.
+Seen from above, the square runs from −½ to ½ in x and y; it is tilted so that z takes all those values too, which shows what
+varies with height. Its UVs run from 0 to 1 as its picture does, its Generated coordinates along all three axes.
 """
 
 from __future__ import annotations
@@ -15,10 +15,12 @@ from .node_links import Scope, find_socket
 from .temporary import leave_nothing_behind, new_camera, plain_render_settings, render_pixels
 
 
-def render_socket(material: bpy.types.Material, socket: bpy.types.NodeSocket, scope: Scope | None, edge: int) -> np.ndarray:
+def render_socket(
+    material: bpy.types.Material, socket: bpy.types.NodeSocket, scope: Scope | None, edge: int, uv_map: str = ""
+) -> np.ndarray:
     """(edge, edge, 3) float32 values of the output ``socket`` over the square, row 0 at v = 0, one sample per pixel.
 
-    Negative values come out as 0, because they travel as emitted light.
+    ``uv_map`` is the name under which nodes ask for the square's UVs.
     """
     with leave_nothing_behind():
         copy = material.copy()
@@ -30,7 +32,7 @@ def render_socket(material: bpy.types.Material, socket: bpy.types.NodeSocket, sc
         for node in tree.nodes:
             if node.bl_idname == "ShaderNodeOutputMaterial" and node != target:
                 tree.nodes.remove(node)
-        return _render(copy, edge)
+        return _render(copy, edge, uv_map or "UVMap")
 
 
 def _lifted(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, scope: Scope | None) -> bpy.types.NodeSocket:
@@ -60,15 +62,15 @@ def _lifted(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, scope: Scope
     return value
 
 
-def _render(material: bpy.types.Material, edge: int) -> np.ndarray:
+def _render(material: bpy.types.Material, edge: int, uv_map: str) -> np.ndarray:
     square = bpy.data.meshes.new("Gridlight Square")
-    square.from_pydata([(-0.5, -0.5, 0), (0.5, -0.5, 0), (0.5, 0.5, 0), (-0.5, 0.5, 0)], [], [(0, 1, 2, 3)])
-    square.uv_layers.new(name="UVMap").uv.foreach_set("vector", [0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0, 1.0])
+    square.from_pydata([(-0.5, -0.5, -0.5), (0.5, -0.5, 0), (0.5, 0.5, 0.5), (-0.5, 0.5, 0)], [], [(0, 1, 2, 3)])
+    square.uv_layers.new(name=uv_map).uv.foreach_set("vector", [0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0, 1.0])
     square.materials.append(material)
     scene = bpy.data.scenes.new("Gridlight Flat Render")
     scene.collection.objects.link(bpy.data.objects.new("Gridlight Square", square))
     scene.camera = new_camera(scene)
-    scene.camera.location.z = 1
+    scene.camera.location.z = 2
     scene.camera.data.type = "ORTHO"
     scene.camera.data.ortho_scale = 1.0
     plain_render_settings(scene)

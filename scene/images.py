@@ -76,14 +76,17 @@ class ImageTable:
         table = self._decoding(image)
         columns = min(width, max(1, round(width * min(1.0, MAX_EDGE / max(width, height)))))
         rows = min(height, max(1, round(height * min(1.0, MAX_EDGE / max(width, height)))))
+        covers = image.alpha_mode != "CHANNEL_PACKED"  # else the fourth channel has nothing to do with the other three
         bands = []
         for start in range(0, height, _CHUNK_ROWS):
             band = _to_rgba(encoded[start:start + _CHUNK_ROWS], table, image)
-            band[..., :3] *= band[..., 3:]  # filtered premultiplied: holes do not stain their rims
+            if covers:
+                band[..., :3] *= band[..., 3:]  # filtered premultiplied: holes do not stain their rims
             bands.append(_box_filter(band, columns, axis=1))
         pixels = _box_filter(np.concatenate(bands), rows, axis=0)
-        alpha = pixels[..., 3:]
-        np.divide(pixels[..., :3], alpha, out=pixels[..., :3], where=alpha > 0)
+        if covers:
+            alpha = pixels[..., 3:]
+            np.divide(pixels[..., :3], alpha, out=pixels[..., :3], where=alpha > 0)
         return np.nan_to_num(pixels, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
 
     def _decoding(self, image: bpy.types.Image) -> np.ndarray | None:

@@ -14,6 +14,7 @@ from ..core.snapshot import NO_IMAGE, Material
 from .images import ImageTable
 from .node_links import Unsupported, active_output, find_socket
 from .notices import Notices
+from .procedurals import sampler_of
 from .shader_nodes import NodeEvaluator
 from .shader_values import ONE, Domain, Value, apply, constant
 from .surface_shaders import DEFAULT_GREY, HOLE, Closure, evaluate_shader
@@ -37,9 +38,9 @@ class MaterialTable:
         if key not in self._indices:
             self._indices[key] = len(self.materials)
             if material is None:
-                self._append("", Closure(DEFAULT_GREY))
+                self._append("", Closure(DEFAULT_GREY), CLIP_THRESHOLD)
             else:
-                self._append(material.name, self._closure(material))
+                self._append(material.name, self._closure(material), _threshold(material))
         return self._indices[key]
 
     def is_hole(self, index: int) -> bool:
@@ -55,7 +56,8 @@ class MaterialTable:
     def _closure(self, material: bpy.types.Material) -> Closure:
         if material.node_tree is None or not material.use_nodes:
             return Closure(constant(material.diffuse_color[:3]), constant(1.0))
-        evaluator = NodeEvaluator(f"material '{material.name}'", self._images, self._notices, material.name)
+        evaluator = NodeEvaluator(f"material '{material.name}'", self._images, self._notices, material.name,
+                                  sampler_of(material))
         output = active_output(material.node_tree, "ShaderNodeOutputMaterial")
         if output is None:
             self._notices.group("materials without an output node are black", material.name)
@@ -71,19 +73,19 @@ class MaterialTable:
             self._notices.append(f"material '{material.name}': {reason}; default grey is used")
             return Closure(DEFAULT_GREY)
 
-    def _append(self, name: str, closure: Closure) -> None:
-        opacity = _solid_where_opaque(closure.opacity)
+    def _append(self, name: str, closure: Closure, threshold: float) -> None:
+        opacity = _solid_where_opaque(closure.opacity, threshold)
         placed = [value for value in (closure.diffuse, opacity, closure.emission)
                   if not value.is_constant and value.domain.uv_map is not None]
         domain = placed[0].domain if placed else Domain()
         diffuse, opacity, emission = (self._in_domain(name, role, value, domain) for role, value in (
             ("base colour", closure.diffuse), ("alpha", opacity), ("emission", closure.emission)))
-        if opacity.is_constant and opacity.number() < CLIP_THRESHOLD and not emission.is_zero():
+        if opacity.is_constant and opacity.number() < threshold and not emission.is_zero():
             self._notices.group("emission on a transparent surface is kept and the surface blocks light", name)
             diffuse, opacity = constant([0.0, 0.0, 0.0]), ONE
         elif opacity.is_constant and 0.001 < opacity.number() < 0.999:
-            verdict = "opaque" if opacity.number() >= CLIP_THRESHOLD else "invisible"
-            self._notices.group(f"partial transparency is not supported: clipped at {CLIP_THRESHOLD}, so {verdict}", name)
+            verdict = "opaque" if opacity.number() >= threshold else "invisible"
+            self._notices.group(f"partial transparency is not supported: clipped at {threshold:g}, so {verdict}", name)
 
         base_image, alpha_image = self._base_images(name, diffuse, opacity)
         self.domains.append(domain)
@@ -95,7 +97,7 @@ class MaterialTable:
             alpha_image=alpha_image,
             emission_image=NO_IMAGE if emission.is_constant else self._add(f"{name} emission", emission, None),
             alpha=opacity.number() if opacity.is_constant else 1.0,
-            alpha_threshold=0.0 if opacity.is_constant and opacity.number() >= CLIP_THRESHOLD else CLIP_THRESHOLD,
+            alpha_threshold=0.0 if opacity.is_constant and opacity.number() >= threshold else threshold,
         ))
 
     def _in_domain(self, name: str, role: str, value: Value, domain: Domain) -> Value:
@@ -137,9 +139,14 @@ def apply_domain(domain: Domain, corner_uvs: np.ndarray) -> np.ndarray:
     return (corner_uvs @ matrix[:, :2].T + matrix[:, 2]).astype(np.float32)
 
 
-def _solid_where_opaque(opacity: Value) -> Value:
+def _threshold(material: bpy.types.Material) -> float:
+    """The alpha below which there is a hole; files from before 4.2 may hold their own."""
+    return float(material.alpha_threshold) if material.blend_method == "CLIP" else CLIP_THRESHOLD
+
+
+def _solid_where_opaque(opacity: Value, threshold: float) -> Value:
     """Constant 1 for an alpha texture without holes, so that nobody samples it."""
-    if not opacity.is_constant and float(opacity.array().min()) >= CLIP_THRESHOLD:
+    if not opacity.is_constant and float(opacity.array().min()) >= threshold:
         return ONE
     return opacity
 

@@ -20,6 +20,10 @@ class Unsupported(Exception):
     """A node or wiring that cannot be evaluated; the message is a short reason."""
 
 
+class Reported(Unsupported):
+    """One that the user has been told of already."""
+
+
 def find_socket(sockets, identifier: str):
     """The enabled socket with this identifier or name, or None."""
     for socket in sockets:

@@ -11,7 +11,7 @@ import numpy as np
 
 from . import shader_math
 from .images import ImageTable
-from .node_links import Scope, Unsupported, find_socket, resolve
+from .node_links import Reported, Scope, Unsupported, find_socket, resolve
 from .notices import Notices
 from .shader_values import SCATTERED, ZERO, Value, apply, as_number, blend, constant, mixed_domains
 from .texture_coordinates import domain_of
@@ -26,9 +26,12 @@ class NodeEvaluator:
     Args:
         owner: names the tree in warnings, such as ``material 'Floor'``.
         owner_name: the datablock's name alone, for warnings that list several.
+        sample: answers for outputs that have no counterpart here; called with the evaluator, the socket and its scope, it
+            returns a Value or raises Unsupported. Without it they are not supported.
     """
 
-    def __init__(self, owner: str, images: ImageTable, notices: Notices, owner_name: str):
+    def __init__(self, owner: str, images: ImageTable, notices: Notices, owner_name: str, sample=None):
+        self.sample = sample
         self.owner = owner
         self.owner_name = owner_name
         self.images = images
@@ -44,8 +47,9 @@ class NodeEvaluator:
         try:
             value = self.output(source, source_scope) if source.is_output else default_value(source)
         except Unsupported as reason:
-            self.notices.append(f"{self.owner}: node '{source.node.name}' feeding '{socket.name}' of '{node.name}' is not "
-                                f"supported ({reason}); that input's own value is used")
+            if not isinstance(reason, Reported):
+                self.notices.append(f"{self.owner}: node '{source.node.name}' feeding '{socket.name}' of '{node.name}' is not "
+                                    f"supported ({reason}); that input's own value is used")
             value = default_value(socket)
         if socket.type == "VALUE":
             value = _mean_of_channels(value) if source.type == "VECTOR" else as_number(value)
@@ -63,11 +67,15 @@ class NodeEvaluator:
         """
         key = (socket.as_pointer(), scope)
         if key not in self._values:
-            node = socket.node
-            evaluate = _NODES.get(node.bl_idname)
-            if evaluate is None:
-                raise Unsupported(f"{node.bl_label} has no counterpart here")
-            self._values[key] = evaluate(self, node, socket, scope)
+            evaluate = _NODES.get(socket.node.bl_idname, _no_counterpart)
+            try:
+                self._values[key] = evaluate(self, socket.node, socket, scope)
+            except Reported:
+                raise
+            except Unsupported:
+                if self.sample is None:
+                    raise
+                self._values[key] = self.sample(self, socket, scope)
         return self._values[key]
 
     def per_pixel(self, node, scope, function, *names: str) -> Value:
@@ -98,6 +106,10 @@ def _mean_of_channels(value: Value) -> Value:
     return apply(lambda array: array.mean(axis=-1, keepdims=True), value)
 
 
+def _no_counterpart(evaluator, node, socket, scope):
+    raise Unsupported(f"{node.bl_label} has no counterpart here")
+
+
 def _rgb(array: np.ndarray) -> np.ndarray:
     return np.broadcast_to(array, (*array.shape[:-1], 3))
 
@@ -108,7 +120,7 @@ def _image_texture(evaluator, node, socket, scope):
         raise Unsupported("no image is chosen")
     pixels = evaluator.images.pixels(node.image, owner)
     if pixels is None:
-        raise Unsupported("its image is missing")
+        raise Reported("its image is missing")
     try:
         if node.projection != "FLAT":
             raise Unsupported(f"{node.projection.lower()} projection")
@@ -337,6 +349,7 @@ def blackbody_color(kelvin: float) -> np.ndarray:
     """(3,) linear Rec. 709 colour of a black body with luminance 1, by Blender itself through a light's temperature."""
     light = bpy.data.lights.new("Gridlight Temperature", "POINT")
     try:
+        light.use_temperature = True
         light.temperature = kelvin
         return np.array(light.temperature_color, float)
     finally:

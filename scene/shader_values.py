@@ -66,6 +66,9 @@ class Value:
     def is_zero(self) -> bool:
         return not self.scale.any() or (self.pixels is not None and not self.pixels.any())
 
+    def is_one(self) -> bool:
+        return self.is_constant and bool((self.scale == 1).all())
+
     def scaled(self, factor) -> Value:
         return replace(self, scale=self.scale * np.atleast_1d(np.asarray(factor, np.float32)))
 
@@ -137,6 +140,8 @@ def complement(value: Value) -> Value:
 
 def blend(factor: Value, first: Value, second: Value) -> Value:
     """first · (1 − factor) + second · factor."""
+    if first is second or (first.is_zero() and second.is_zero()):
+        return first
     if factor.is_constant and factor.scale.size == 1:
         weight = float(factor.scale[0])
         return add(first.scaled(1 - weight), second.scaled(weight))

@@ -151,7 +151,7 @@ def _opaque_mix(factor: Value, first: Closure, second: Closure) -> Value:
         return second.diffuse
     if second.opacity.is_zero():
         return first.diffuse
-    if first.opacity is ONE and second.opacity is ONE:
+    if first.opacity.is_one() and second.opacity.is_one():
         return blend(factor, first.diffuse, second.diffuse)
 
     def weighted(f, first_opacity, second_opacity, first_color, second_color):
@@ -165,7 +165,7 @@ def _opaque_mix(factor: Value, first: Closure, second: Closure) -> Value:
 def _add(evaluator, node, scope):
     first, second = (evaluate_shader(evaluator, item, scope) for item in node.inputs[:2])
     emission = add(first.emission, second.emission)
-    if first.opacity is ONE and second.opacity is ONE:
+    if first.opacity.is_one() and second.opacity.is_one():
         return Closure(add(first.diffuse, second.diffuse), ONE, emission)
     opacity = apply(lambda a, b: np.clip(a + b - 1, 0, 1), first.opacity, second.opacity)  # what both let through adds up
     solid = first if second.opacity.is_zero() else second

@@ -1,0 +1,313 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Materials: what each kind of shader becomes, and that nothing turns black in silence."""
+
+import bpy
+import numpy as np
+import pytest
+from scene_builders import empty_scene, image, material, node, place, quad, with_nodes
+
+from gridlight.core.snapshot import NO_IMAGE
+from gridlight.scene.read import read_scene
+
+HALF = np.full((8, 8, 4), 1.0, np.float32)
+HALF[..., :3] = [0.2, 0.4, 0.6]
+HALF[:, :4, 3] = 0  # left half is a hole
+OPAQUE = np.where(np.arange(4) == 3, 1, HALF).astype(np.float32)
+
+
+@pytest.fixture
+def scene():
+    return empty_scene()
+
+
+def read(scene, made):
+    """(Material, snapshot) of ``made`` on a square with UVs."""
+    data = quad(uv_map="UVMap")
+    data.materials.append(made)
+    place(data, "thing")
+    snapshot = read_scene(scene)
+    return snapshot.materials[0], snapshot
+
+
+def built(shader_of):
+    """A material whose Surface is the output socket that ``shader_of(tree)`` returns."""
+    made = bpy.data.materials.new("Subject")
+    tree = with_nodes(made)
+    node(tree, "ShaderNodeOutputMaterial", {"Surface": shader_of(tree)})
+    return made
+
+
+def textured(tree, kind="Color", pixels=HALF, **properties):
+    return node(tree, "ShaderNodeTexImage", image=image("leaf", pixels), **properties).outputs[kind]
+
+
+def warned(snapshot, *words):
+    return any(all(word in line for word in words) for line in snapshot.warnings)
+
+
+@pytest.mark.parametrize(("kind", "color"), [
+    ("ShaderNodeBsdfDiffuse", "Color"), ("ShaderNodeBsdfPrincipled", "Base Color"),
+    ("ShaderNodeSubsurfaceScattering", "Color"), ("ShaderNodeBsdfToon", "Color"),
+])
+def test_diffuse_colours(scene, kind, color):
+    read_material, snapshot = read(scene, material("m", kind, {color: (0.1, 0.2, 0.3, 1)}))
+    assert read_material.base_color == pytest.approx((0.1, 0.2, 0.3))
+    assert read_material.emission == (0, 0, 0) and read_material.alpha_threshold == 0 and not snapshot.warnings
+
+
+def test_material_without_nodes(scene):
+    if bpy.app.version >= (5, 0):
+        pytest.skip("every material has nodes in 5.x")
+    made = bpy.data.materials.new("plain")
+    made.use_nodes = False
+    made.diffuse_color = (0.3, 0.2, 0.1, 1)
+    assert read(scene, made)[0].base_color == pytest.approx((0.3, 0.2, 0.1))
+
+
+def test_metal_and_transmission_take_their_share(scene):
+    read_material, snapshot = read(scene, material("Steel", "ShaderNodeBsdfPrincipled", {
+        "Base Color": (1, 0.5, 0.5, 1), "Metallic": 0.75, "Transmission Weight": 0.2}))
+    assert read_material.base_color == pytest.approx((0.2, 0.1, 0.1))
+    assert warned(snapshot, "metallic", "'Steel'")
+
+
+def test_emission_is_colour_times_strength(scene):
+    read_material, _ = read(scene, material("m", "ShaderNodeEmission", {"Color": (1, 0.5, 0.25, 1), "Strength": 4.0}))
+    assert read_material.emission == pytest.approx((4, 2, 1)) and read_material.base_color == (0, 0, 0)
+
+
+def test_principled_emission(scene):
+    read_material, _ = read(scene, material("p", "ShaderNodeBsdfPrincipled",
+                                            {"Emission Color": (1, 0, 0.5, 1), "Emission Strength": 3.0}))
+    assert read_material.emission == pytest.approx((3, 0, 1.5))
+    assert read_material.base_color == pytest.approx((0.8, 0.8, 0.8))
+
+
+def test_image_texture_is_shared_between_tints(scene):
+    def tinted(color):
+        def shader(tree):
+            shown = node(tree, "ShaderNodeTexImage", image=picture)
+            mixed = node(tree, "ShaderNodeMix", {"Factor_Float": 1.0, "A_Color": shown.outputs["Color"], "B_Color": color},
+                         data_type="RGBA", blend_type="MULTIPLY")
+            return node(tree, "ShaderNodeBsdfDiffuse", {"Color": mixed.outputs[2]}).outputs[0]
+        return built(shader)
+
+    picture = image("shared", OPAQUE)
+    data = quad(uv_map="UVMap")
+    place(data)
+    data.materials.append(tinted((1, 0.5, 0.25, 1)))
+    second = quad(uv_map="UVMap")
+    place(second)
+    second.materials.append(tinted((0.5, 0.5, 0.5, 1)))
+    snapshot = read_scene(scene)
+    assert len(snapshot.images) == 1
+    assert [item.base_image for item in snapshot.materials] == [0, 0]
+    assert snapshot.materials[0].base_color == pytest.approx((1, 0.5, 0.25))
+    assert np.allclose(snapshot.images[0].pixels[0, 0], [0.2, 0.4, 0.6, 1])
+
+
+@pytest.mark.parametrize("way", ["principled", "mix", "threshold"])
+def test_leaves_are_clipped_by_their_alpha(scene, way):
+    def shader(tree):
+        shown = node(tree, "ShaderNodeTexImage", image=image("leaf", HALF), extension="CLIP")
+        alpha = shown.outputs["Alpha"]
+        if way == "principled":
+            return node(tree, "ShaderNodeBsdfPrincipled", {"Base Color": shown.outputs["Color"], "Alpha": alpha}).outputs[0]
+        if way == "threshold":
+            alpha = node(tree, "ShaderNodeMath", {"Value": alpha, "Value_001": 0.3}, operation="GREATER_THAN").outputs[0]
+        leaf = node(tree, "ShaderNodeBsdfDiffuse", {"Color": shown.outputs["Color"]})
+        hole = node(tree, "ShaderNodeBsdfTransparent")
+        return node(tree, "ShaderNodeMixShader", {"Fac": alpha, "Shader": hole.outputs[0],
+                                                  "Shader_001": leaf.outputs[0]}).outputs[0]
+
+    read_material, snapshot = read(scene, built(shader))
+    assert read_material.alpha_threshold == 0.5
+    assert read_material.base_image == read_material.alpha_image == 0 and len(snapshot.images) == 1
+    pixels = snapshot.images[0].pixels
+    assert np.allclose(pixels[:, :4, 3], 0) and np.allclose(pixels[:, 4:], [0.2, 0.4, 0.6, 1], atol=1e-6)
+    assert snapshot.images[0].extension == "CLIP" and not snapshot.warnings
+
+
+def test_colour_is_premultiplied_where_alpha_is_not_used(scene):
+    read_material, snapshot = read(scene, built(
+        lambda tree: node(tree, "ShaderNodeBsdfDiffuse", {"Color": textured(tree)}).outputs[0]))
+    pixels = snapshot.images[read_material.base_image].pixels
+    assert np.allclose(pixels[:, :4, :3], 0) and np.allclose(pixels[:, 4:, :3], [0.2, 0.4, 0.6])
+    assert read_material.alpha_image == NO_IMAGE
+
+
+def test_constant_transparency(scene):
+    read_material, snapshot = read(scene, material("Veil", "ShaderNodeBsdfPrincipled", {"Alpha": 0.7}))
+    assert read_material.alpha_threshold == 0 and warned(snapshot, "partial transparency", "opaque", "'Veil'")
+    scene = empty_scene()
+    _, snapshot = read(scene, material("Air", "ShaderNodeBsdfPrincipled", {"Alpha": 0.2}))
+    assert len(snapshot.triangles) == 0 and warned(snapshot, "invisible", "'Air'")
+
+
+@pytest.mark.parametrize(("kind", "inputs"), [("ShaderNodeBsdfGlass", {}), ("ShaderNodeBsdfRefraction", {}),
+                                              ("ShaderNodeBsdfPrincipled", {"Transmission Weight": 1.0})])
+def test_glass_lets_light_through(scene, kind, inputs):
+    _, snapshot = read(scene, material("Pane", kind, inputs))
+    assert len(snapshot.triangles) == 0 and warned(snapshot, "glass", "'Pane'")
+
+
+def test_fully_transparent_surfaces_go_without_a_warning(scene):
+    _, snapshot = read(scene, material("m", "ShaderNodeBsdfTransparent"))
+    assert len(snapshot.triangles) == 0 and not snapshot.warnings
+
+
+def test_mix_and_add_shaders(scene):
+    def shader(tree):
+        red = node(tree, "ShaderNodeBsdfDiffuse", {"Color": (1, 0, 0, 1)})
+        lamp = node(tree, "ShaderNodeEmission", {"Color": (1, 1, 1, 1), "Strength": 2.0})
+        blue = node(tree, "ShaderNodeBsdfDiffuse", {"Color": (0, 0, 1, 1)})
+        mixed = node(tree, "ShaderNodeMixShader", {"Fac": 0.25, "Shader": red.outputs[0], "Shader_001": lamp.outputs[0]})
+        return node(tree, "ShaderNodeAddShader", {"Shader": mixed.outputs[0], "Shader_001": blue.outputs[0]}).outputs[0]
+
+    read_material, _ = read(scene, built(shader))
+    assert read_material.base_color == pytest.approx((0.75, 0, 1))
+    assert read_material.emission == pytest.approx((0.5, 0.5, 0.5))
+
+
+def test_glossy_keeps_its_energy_and_says_so(scene):
+    read_material, snapshot = read(scene, material("Chrome", "ShaderNodeBsdfAnisotropic", {"Color": (0.9, 0.8, 0.7, 1)}))
+    assert read_material.base_color == pytest.approx((0.9, 0.8, 0.7)) and warned(snapshot, "glossy", "'Chrome'")
+
+
+def test_two_outputs_the_one_for_cycles_counts(scene):
+    made = bpy.data.materials.new("m")
+    tree = with_nodes(made)
+    for color, target in (((1, 0, 0, 1), "EEVEE"), ((0, 1, 0, 1), "CYCLES"), ((0, 0, 1, 1), "ALL")):
+        shader = node(tree, "ShaderNodeBsdfDiffuse", {"Color": color})
+        node(tree, "ShaderNodeOutputMaterial", {"Surface": shader.outputs[0]}, target=target)
+    assert read(scene, made)[0].base_color == (0, 1, 0)
+
+
+def test_missing_image_falls_back_to_the_sockets_colour(scene, tmp_path):
+    lost = bpy.data.images.new("Lost", 4, 4)
+    lost.source = "FILE"
+    lost.filepath = str(tmp_path / "nowhere.png")
+    lost.reload()
+
+    def shader(tree):
+        shown = node(tree, "ShaderNodeTexImage", image=lost)
+        return node(tree, "ShaderNodeBsdfDiffuse", {"Color": shown.outputs["Color"]}).outputs[0]
+
+    read_material, snapshot = read(scene, built(shader))
+    assert read_material.base_color == pytest.approx((0.8, 0.8, 0.8)) and read_material.base_image == NO_IMAGE
+    assert warned(snapshot, "'Lost'", "'Subject'", "missing") and len(snapshot.warnings) == 1
+
+
+def test_image_by_generated_coordinates_is_averaged(scene):
+    def shader(tree):
+        coordinates = node(tree, "ShaderNodeTexCoord")
+        shown = node(tree, "ShaderNodeTexImage", {"Vector": coordinates.outputs["Generated"]},
+                     image=image("bands", OPAQUE))
+        return node(tree, "ShaderNodeBsdfDiffuse", {"Color": shown.outputs["Color"]}).outputs[0]
+
+    read_material, snapshot = read(scene, built(shader))
+    assert read_material.base_color == pytest.approx((0.2, 0.4, 0.6), rel=1e-5)
+    assert warned(snapshot, "'bands'", "'Subject'", "Generated")
+
+
+def test_procedural_textures_enter_with_their_mean(scene):
+    def shader(tree):
+        checker = node(tree, "ShaderNodeTexChecker", {"Color1": (1, 0, 0, 1), "Color2": (0, 1, 0, 1), "Scale": 8.0})
+        ramp = node(tree, "ShaderNodeValToRGB", {"Fac": checker.outputs["Fac"]})
+        ramp.color_ramp.elements[0].color = (0, 0, 1, 1)
+        mixed = node(tree, "ShaderNodeMix", {"Factor_Float": 0.5, "A_Color": checker.outputs["Color"],
+                                             "B_Color": ramp.outputs["Color"]}, data_type="RGBA")
+        return node(tree, "ShaderNodeBsdfDiffuse", {"Color": mixed.outputs[2]}).outputs[0]
+
+    read_material, snapshot = read(scene, built(shader))
+    # Checker: half red, half green; the ramp turns its 1 and 0 into white and blue.
+    assert read_material.base_color == pytest.approx((0.5, 0.5, 0.5), abs=0.05)
+    assert warned(snapshot, "procedural", "Subject")
+
+
+def test_a_procedural_texture_laid_out_by_uvs_keeps_its_pattern(scene):
+    def shader(tree):
+        coordinates = node(tree, "ShaderNodeTexCoord")
+        checker = node(tree, "ShaderNodeTexChecker", {"Vector": coordinates.outputs["UV"], "Color1": (1, 0, 0, 1),
+                                                      "Color2": (0, 0, 1, 1), "Scale": 2.0})
+        return node(tree, "ShaderNodeBsdfDiffuse", {"Color": checker.outputs["Color"]}).outputs[0]
+
+    read_material, snapshot = read(scene, built(shader))
+    pixels = snapshot.images[read_material.base_image].pixels
+    edge = len(pixels)
+    assert not np.allclose(pixels[edge // 4, edge // 4], pixels[edge // 4, 3 * edge // 4])
+    assert np.allclose(pixels[edge // 4, edge // 4], pixels[3 * edge // 4, 3 * edge // 4])
+
+
+def test_a_procedural_texture_inside_a_group(scene):
+    group = bpy.data.node_groups.new("Inner", "ShaderNodeTree")
+    group.interface.new_socket("Paint", in_out="INPUT", socket_type="NodeSocketColor")
+    group.interface.new_socket("Out", in_out="OUTPUT", socket_type="NodeSocketColor")
+    entry, exit_node = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+    checker = node(group, "ShaderNodeTexChecker", {"Color1": entry.outputs[0], "Color2": (0, 0, 0, 1), "Scale": 8.0})
+    group.links.new(checker.outputs[0], exit_node.inputs[0])
+    groups_before = len(bpy.data.node_groups)
+
+    def shader(tree):
+        outer = tree.nodes.new("ShaderNodeGroup")
+        outer.node_tree = group
+        outer.inputs[0].default_value = (0.6, 0.2, 0.4, 1)
+        return node(tree, "ShaderNodeBsdfDiffuse", {"Color": outer.outputs[0]}).outputs[0]
+
+    read_material, _ = read(scene, built(shader))
+    assert read_material.base_color == pytest.approx((0.3, 0.1, 0.2), abs=0.03)
+    assert len(bpy.data.node_groups) == groups_before and len(group.interface.items_tree) == 2
+
+
+def test_what_depends_on_the_object_falls_back_to_the_socket_and_is_named(scene):
+    def shader(tree):
+        attribute = node(tree, "ShaderNodeVertexColor", name="Paint Layer")
+        return node(tree, "ShaderNodeBsdfDiffuse", {"Color": attribute.outputs["Color"]}).outputs[0]
+
+    read_material, snapshot = read(scene, built(shader))
+    assert read_material.base_color == pytest.approx((0.8, 0.8, 0.8))
+    assert warned(snapshot, "'Subject'", "'Paint Layer'", "'Color'")
+
+
+def test_light_path_tricks_are_seen_by_diffuse_rays(scene):
+    def shader(tree):
+        path = node(tree, "ShaderNodeLightPath")
+        shown = node(tree, "ShaderNodeEmission", {"Strength": 100.0})
+        real = node(tree, "ShaderNodeEmission", {"Strength": 2.0})
+        return node(tree, "ShaderNodeMixShader", {"Fac": path.outputs["Is Camera Ray"], "Shader": real.outputs[0],
+                                                  "Shader_001": shown.outputs[0]}).outputs[0]
+
+    assert read(scene, built(shader))[0].emission == pytest.approx((2, 2, 2))
+
+
+def test_textures_with_mappings_of_their_own_are_averaged_and_named(scene):
+    def shader(tree):
+        base = textured(tree, pixels=OPAQUE)
+        coordinates = node(tree, "ShaderNodeTexCoord")
+        moved = node(tree, "ShaderNodeMapping", {"Vector": coordinates.outputs["UV"], "Scale": (3, 3, 3)})
+        glow = node(tree, "ShaderNodeTexImage", {"Vector": moved.outputs[0]}, image=image("glow", OPAQUE))
+        return node(tree, "ShaderNodeBsdfPrincipled", {"Base Color": base, "Emission Color": glow.outputs["Color"],
+                                                       "Emission Strength": 2.0}).outputs[0]
+
+    read_material, snapshot = read(scene, built(shader))
+    assert read_material.base_image != NO_IMAGE and read_material.emission_image == NO_IMAGE
+    assert read_material.emission == pytest.approx((0.4, 0.8, 1.2), rel=1e-4)
+    assert warned(snapshot, "'Subject'", "emission", "mapping of its own")
+
+
+def test_unconnected_output_is_black_and_volumes_are_named(scene):
+    made = bpy.data.materials.new("Fog")
+    tree = with_nodes(made)
+    volume = node(tree, "ShaderNodeVolumeScatter")
+    node(tree, "ShaderNodeOutputMaterial", {"Volume": volume.outputs[0]})
+    _, snapshot = read(scene, made)
+    assert len(snapshot.triangles) == 0 and warned(snapshot, "volume", "'Fog'")
+
+
+def test_warnings_are_one_line_for_many(scene):
+    data = quad(uv_map="UVMap")
+    place(data)
+    for index in range(20):
+        data.materials.append(material(f"metal {index}", "ShaderNodeBsdfPrincipled", {"Metallic": 1.0}))
+    lines = read_scene(scene).warnings
+    assert len(lines) == 1 and "and 14 more" in lines[0]
