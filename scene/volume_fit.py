@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A probe volume for a scene that has none: where an artist would have put it.
 
-1. Backdrops are left out: a flat object (a ground plane) more than twice as large as everything else together, an object that
-   only emits (a sky dome) more than five times as large, any object more than thirty times as large.
+1. Backdrops are left out: a flat object (a ground plane) more than twice as large as everything smaller together, an object that
+   only emits (a sky dome) more than five times as large, a low one (a terrain) more than ten times as large. Anything else is
+   a room, however little stands in it.
 2. Stragglers are left out: along every axis the volume ends where all but 0.1 % of the surface area lies, unless the rest is
    near, which means within a quarter of that core.
 3. Backdrops come back a little: around what stands on them a tenth of the core's diagonal, as far as they reach.
@@ -21,8 +22,8 @@ from ..core.grid import Grid
 from ..core.settings import MAX_RESOLUTION
 from ..core.snapshot import NO_IMAGE, SceneSnapshot
 
-_FLAT_BACKDROP, _SKY_BACKDROP, _ANY_BACKDROP = 2.0, 5.0, 30.0  # size against all the rest
-_FLAT = 0.02  # thickness of a flat object against its size
+_FLAT_BACKDROP, _SKY_BACKDROP, _LOW_BACKDROP = 2.0, 5.0, 10.0  # size against all that is smaller
+_FLAT, _LOW = 0.02, 0.15  # thickness against size
 _STRAGGLING_AREA = 0.001  # share of the surface area that may lie outside, per side
 _NEAR = 0.25  # of the core's extent
 _BACKDROP_MARGIN = 0.1  # of the core's diagonal
@@ -114,8 +115,9 @@ def _without_backdrops(snapshot, lows, highs, present) -> np.ndarray:
     emitters = _only_emitting(snapshot)
     for place, item in enumerate(order[:int(present.sum()) - 1]):
         rest = np.linalg.norm(rest_high[place + 1] - rest_low[place + 1])
-        thickness = (highs[item] - lows[item]).min()
-        limit = _FLAT_BACKDROP if thickness < _FLAT * sizes[item] else _SKY_BACKDROP if item in emitters else _ANY_BACKDROP
+        thickness = (highs[item] - lows[item]).min() / sizes[item]
+        limit = (_FLAT_BACKDROP if thickness < _FLAT else _SKY_BACKDROP if item in emitters
+                 else _LOW_BACKDROP if thickness < _LOW else np.inf)
         if sizes[item] <= limit * rest:
             break
         kept[item] = False

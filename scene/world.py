@@ -20,7 +20,11 @@ from .shader_nodes import DIFFUSE_RAY, NodeEvaluator
 from .temporary import leave_nothing_behind, new_camera, plain_render_settings, render_pixels
 from .texture_coordinates import affine_coordinates
 
-RENDERED_WIDTH, RENDERED_HEIGHT, RENDERED_SAMPLES = 256, 128, 128
+RENDERED_WIDTH, RENDERED_HEIGHT, RENDERED_SAMPLES = 256, 128, 64
+
+# A sun disc covers a fraction of a pixel and outshines everything: pixels this much brighter than the mean are rendered again,
+# with enough samples that the disc's share of them is right.
+_SUN_CONTRAST, _SUN_SAMPLES, _SUN_MAX_PIXELS = 20.0, 8192, 256
 
 
 def read_world(scene: bpy.types.Scene, notices: Notices) -> World:
@@ -115,7 +119,30 @@ def _rendered(scene: bpy.types.Scene, world: bpy.types.World) -> np.ndarray:
         plain_render_settings(alone)
         unbiased_settings(alone, RENDERED_SAMPLES, bounces=0)
         alone.render.resolution_x, alone.render.resolution_y = RENDERED_WIDTH, RENDERED_HEIGHT
-        return render_pixels(alone, alone.view_layers[0].name)
+        layer = alone.view_layers[0].name
+        panorama = render_pixels(alone, layer)
+        _refine_sun(alone, layer, panorama)
+        return panorama
+
+
+def _refine_sun(scene: bpy.types.Scene, layer: str, panorama: np.ndarray) -> None:
+    """Replace the few pixels of ``panorama`` around a sun by well sampled ones."""
+    brightness = panorama.mean(axis=-1)
+    rows, columns = np.nonzero(brightness > _SUN_CONTRAST * brightness.mean())
+    if not len(rows):
+        return
+    height, width = brightness.shape
+    # One pixel more on every side, where samples may have missed the disc's rim.
+    bottom, top = max(rows.min() - 1, 0), min(rows.max() + 2, height)
+    left, right = max(columns.min() - 1, 0), min(columns.max() + 2, width)
+    if (top - bottom) * (right - left) > _SUN_MAX_PIXELS:
+        return  # several bright places or a broad one: neither is missed by samples
+    render = scene.render
+    render.use_border = render.use_crop_to_border = True
+    render.border_min_x, render.border_max_x = left / width, right / width
+    render.border_min_y, render.border_max_y = bottom / height, top / height
+    scene.cycles.samples = _SUN_SAMPLES
+    panorama[bottom:top, left:right] = render_pixels(scene, layer)
 
 
 def _seen_by_diffuse_rays(world: bpy.types.World) -> bpy.types.World:
