@@ -5,7 +5,8 @@ Iterations are a geometric series: once one mode dominates, each change is r tim
 change · r/(1−r). That sum, not the last change, is held against the tolerance; a furnace with albedo 0.99 shows why: its changes are
 1 % of the field when 63 % of the light is still missing. Where the changes have become parallel, the sum is added at once (Aitken's
 delta-squared process for vectors), which saves most iterations of bright rooms. Parallel matters: a mode that alternates
-in sign shrinks just as steadily and would be blown up.
+in sign shrinks just as steadily and would be blown up. Two estimates in a row must be below the tolerance: bright lamps in view and a dim
+room around them are two modes, and the first changes tell only of the fast one.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from __future__ import annotations
 import math
 
 AUTO_LIMIT = 512
-_PARALLEL = 0.999  # least cosine between two changes for the tail to be added
+_PARALLEL = 0.5  # most sine of the angle between two changes for the tail to be added, per (1 − ratio)
+_SINE_ROUNDING = 1e-6  # squared sine below what float32 sums can tell from zero
 _MOST_RATIO = 0.9985  # above it the tail is too uncertain to add
 _ROUNDING = 5e-7  # relative change that is nothing but float32 rounding
 
@@ -25,6 +27,7 @@ class Convergence:
         self._bounces = bounces
         self._tolerance = tolerance
         self._lengths: list[float] = []  # |change| of the iterations since the last extrapolation
+        self._slowest = 0.0  # ratio of the slowest mode that was extrapolated: changes may still hold some of it
         self.iterations = 0
         self.changes: list[float] = []  # relative change of the field per iteration
         self.missing = math.inf  # estimated share of the light still to come
@@ -41,7 +44,8 @@ class Convergence:
         self._lengths.append(math.sqrt(change))
         relative = math.sqrt(change / energy) if energy > 0 else 0.0
         self.changes.append(relative)
-        ratio = self._ratio()
+        ratio = max(self._ratio(), self._slowest)
+        last_missing = self.missing
         if relative < _ROUNDING:
             self.missing = relative
         else:
@@ -51,7 +55,7 @@ class Convergence:
             self.done = bounces >= self._bounces
             self.converged = True
             self.reason = f"stopped after the {self._bounces} bounces asked for, {self.missing:.2g} of the light estimated missing"
-        elif self.missing < self._tolerance:
+        elif self.missing < self._tolerance and (last_missing < self._tolerance or relative < _ROUNDING):
             self.done = self.converged = True
             self.reason = (f"converged after {self.iterations} iterations: an estimated {self.missing:.2g} of the light is missing, "
                            f"tolerance {self._tolerance:g}")
@@ -59,16 +63,27 @@ class Convergence:
             self.done = True
             self.reason = (f"not converged after {AUTO_LIMIT} bounces: each still adds {ratio:.4f} of the one before; "
                            "surfaces that reflect all light never settle, lower their base colour")
-        elif len(self._lengths) >= 3 and overlap > _PARALLEL * self._lengths[-1] * self._lengths[-2] and ratio < _MOST_RATIO:
+        elif len(self._lengths) >= 3 and self._is_parallel(overlap):
+            step = self._lengths[-1] / self._lengths[-2]
+            self._slowest = max(self._slowest, step)
             self._lengths.clear()
-            return ratio / (1.0 - ratio)
+            return step / (1.0 - step)
         return 0.0
 
+    def _is_parallel(self, overlap: float) -> bool:
+        """Do the last two changes belong to one mode? The slower it is, the more it is multiplied and the less else may be in it."""
+        last, before = self._lengths[-1], self._lengths[-2]
+        if overlap <= 0 or last >= _MOST_RATIO * before:
+            return False
+        sine_squared = max(1.0 - (overlap / (last * before)) ** 2, 0.0)
+        least = max((_PARALLEL * (1.0 - last / before)) ** 2, _SINE_ROUNDING)
+        return sine_squared < least
+
     def _ratio(self) -> float:
-        """By how much a change is smaller than the one before: over two steps where there are, so that alternation evens out."""
+        """By how much a change is smaller than the one before, the larger of the last step and the mean of the last two: where a fast
+        mode hides a slow one the last step is first to show it, where changes alternate the mean is steadier."""
         lengths = self._lengths
-        if len(lengths) >= 3 and lengths[-3] > 0:
-            return math.sqrt(lengths[-1] / lengths[-3])
-        if len(lengths) == 2 and lengths[-2] > 0:
-            return lengths[-1] / lengths[-2]
-        return math.inf
+        if len(lengths) < 2 or lengths[-2] == 0:
+            return math.inf
+        step = lengths[-1] / lengths[-2]
+        return max(step, math.sqrt(lengths[-1] / lengths[-3])) if len(lengths) >= 3 and lengths[-3] > 0 else step

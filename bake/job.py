@@ -140,6 +140,18 @@ def bake_steps(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, repo
                 backend.extrapolate(factor)
         yield
 
+    if settings.gather:
+        reporter.phase("gather", len(nodes))
+        for index in range(batches.count):
+            with _timed(result, "light"):
+                surfaces = batches.lit(index)
+                backend.gather(surfaces)
+                backend.iterate(surfaces, read_field=False)
+                reporter.advance(surfaces.count)
+            yield
+        with _timed(result, "light"):
+            backend.finish_iteration()
+
     with _timed(result, "light"):
         result.iterations = convergence.iterations
         result.converged = convergence.converged

@@ -243,6 +243,25 @@ class GpuBackend:
         shader.uniform_int("read_field", (int(read_field),))
         gpu.compute.dispatch(shader, surfaces.count, 1, 1)
 
+    def gather(self, surfaces: Surfaces) -> None:
+        """Adds to source what really traced bounces bring; afterwards iterate without reading the field."""
+        shader = program("gather_comp", FACE=self.face, BANDS=self.settings.bands, COEFFICIENTS=self.coefficients,
+                         **self.scene.surface_defines, STACK_SIZE=self.scene.hierarchy.stack_size)
+        self.scene.bind_surfaces(shader)
+        self.scene.bind(shader, "lights")
+        shader.uniform_block("grid_info", self._grid_info)
+        for name, texture in (("grid_nodes", self._grid_nodes), ("depth_moments", self._moments), ("field_in", self._field[0]),
+                              ("world_texels", self._world_texels), ("probe_slots", self._probe_slots)):
+            shader.uniform_sampler(name, texture)
+        for name in ("geometry", "albedo"):
+            shader.uniform_sampler(name, surfaces.textures[name])
+        shader.image("source", surfaces.textures["source"])
+        self._set_range(shader, surfaces)
+        for name, value in (("light_count", self.scene.light_count), ("samples", self.settings.samples),
+                            ("bounces", self.settings.gather), ("seed", self.settings.seed)):
+            shader.uniform_int(name, (value,))
+        self._dispatch_texels(shader, surfaces.count)
+
     def finish_iteration(self) -> tuple[float, float, float, float]:
         """Fills inactive nodes and makes the field just written the newest.
 

@@ -183,3 +183,16 @@ def preview_comp(info, defines):
     info.local_group_size(8, 8, 1)
     return {"compute": ["data_lib", "cubemap_lib", "random_lib", "spherical_harmonics_lib", "surface_lib", "ray_lib",
                         "direct_light_lib", "lookup_lib", "field_lib", "preview_comp"]}
+
+
+def gather_comp(info, defines):
+    info.define("NO_SURFACE", NO_SURFACE)
+    slot = _scene(info, defines)
+    slot = _lookup(info, slot)
+    slot = _samplers(info, "lights", "field_in", "world_texels", "probe_slots", first=slot)
+    _samplers(info, "geometry", "albedo", kind="FLOAT_2D_ARRAY", first=slot)
+    _image(info, 0, "source", layered=True, access="READ+WRITE")
+    _ints(info, "first_slot", "first_layer", "light_count", "samples", "bounces", "seed")
+    info.local_group_size(8, 8, 1)
+    return {"compute": ["data_lib", "cubemap_lib", "random_lib", "spherical_harmonics_lib", "surface_lib", "ray_lib",
+                        "direct_light_lib", "lookup_lib", "field_lib", "gather_comp"]}

@@ -71,10 +71,9 @@ LightSample sample_light(int light, vec3 point, vec2 u)
     vec3 to_light = to_centre + place.x * right.w * right.xyz + place.y * up.w * up.xyz;
     light_sample.distance = length(to_light);
     light_sample.direction = to_light / max(light_sample.distance, 1.0e-20);
+    /* the light shines along −back: the surface must lie in front of it */
     float cosine = dot(light_sample.direction, back_shadow.xyz);
     float area = right.w * up.w * (kind == ELLIPSE ? 0.7853981633974483 : 1.0);
-    /* the light shines along −back: the surface must lie in front of it */
-    cosine = -cosine;
     float spread = 1.0;
     if (parameters.y > 0.0) {
       float tangent = sqrt(max(1.0 - cosine * cosine, 0.0)) / max(cosine, 1.0e-6);

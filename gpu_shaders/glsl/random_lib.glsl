@@ -16,9 +16,10 @@ uvec3 pcg3d(uvec3 v)
   return v;
 }
 
-/* Two numbers in [0, 1): sample `index` of the sequence that belongs to `key`. */
+/* Two numbers in [0, 1): sample `index` of the sequence that belongs to `key`. In integers, whose overflow is the sequence's
+ * modulo 1: exact for any index, the same on every driver. */
 vec2 sample_r2(uvec3 key, int index)
 {
-  vec2 start = vec2(pcg3d(key).xy >> 8u) * (1.0 / 16777216.0);
-  return fract(start + vec2(0.7548776662466927, 0.5698402909980532) * float(index));
+  uvec2 place = pcg3d(key).xy + uvec2(3242174889u, 2447445414u) * uint(index);
+  return vec2(place >> 8u) * (1.0 / 16777216.0);
 }
