@@ -100,7 +100,7 @@ def _sample_area(light: Light, points: np.ndarray, u: np.ndarray) -> LightSample
     to_light = centre - points + place[:, :1] * light.size_x * right + place[:, 1:] * light.size_y * up
     distances = np.linalg.norm(to_light, axis=1)
     directions = to_light / np.maximum(distances, 1e-20)[:, None]
-    cosine = -directions @ back
+    cosine = directions @ back
     area = light.size_x * light.size_y * (np.pi / 4 if is_ellipse else 1.0)
     spread = np.ones(len(points))
     if light.spread < _FULL_SPREAD:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-# Fractions of Roberts' R2 sequence: 1/ρ and 1/ρ² of the plastic number ρ, the real root of ρ³ = ρ + 1.
-R2_STEP = np.array([0.7548776662466927, 0.5698402909980532], np.float32)
+# Steps of Roberts' R2 sequence times 2³²: 1/ρ and 1/ρ² of the plastic number ρ, the real root of ρ³ = ρ + 1.
+R2_STEP = np.array([3242174889, 2447445414], np.uint32)
 
 
 def pcg3d(keys: np.ndarray) -> np.ndarray:
@@ -34,12 +34,11 @@ def _mix(v: np.ndarray) -> np.ndarray:
 def sample_r2(keys: np.ndarray, index: int) -> np.ndarray:
     """(…, 2) float32 numbers in [0, 1): sample ``index`` of the sequence that belongs to each of ``keys`` (…, 3) uint32.
 
-    The R2 sequence, two-dimensional and of low discrepancy, shifted by the hash modulo 1 (Cranley and Patterson 1976). Single
-    precision on purpose: the shader's numbers, to the last bit where the driver does not fuse the multiplication and addition.
+    The R2 sequence, two-dimensional and of low discrepancy, shifted by the hash modulo 1 (Cranley and Patterson 1976), in integers
+    whose overflow is the modulo: the shader's numbers to the last bit.
     """
-    start = (pcg3d(keys)[..., :2] >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
-    value = start + R2_STEP * np.float32(index)
-    return value - np.floor(value)
+    place = pcg3d(keys)[..., :2] + R2_STEP * np.uint32(index)
+    return (place >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
 
 
 def light_keys(nodes: np.ndarray, texels: np.ndarray, light: int, seed: int) -> np.ndarray:

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""When iterations stop, on series whose limit is known: a bounce adds ``ratio`` of the one before."""
+
+import numpy as np
+import pytest
+from gridlight.bake.convergence import AUTO_LIMIT, Convergence
+
+
+def run(operator, source, tolerance=2e-3, bounces=None):
+    """Iterates x ← source + operator·x as a bake does, extrapolating when told to. Returns (state, convergence)."""
+    watch = Convergence(bounces, tolerance)
+    older = old = np.zeros_like(source)
+    while not watch.done:
+        new = source + operator @ old if watch.iterations else source.copy()
+        change = new - old
+        factor = watch.add(float(new @ new), float(change @ change), float(change @ (old - older)))
+        assert watch.iterations < 2 * AUTO_LIMIT
+        older, old = old, new + factor * change
+    return old, watch
+
+
+@pytest.mark.parametrize("ratio,most", [(0.0, 3), (0.1, 6), (0.5, 12), (0.9, 20), (0.99, 60)])
+def test_one_mode_converges_to_its_limit(ratio, most):
+    state, watch = run(np.array([[ratio]]), np.array([1.0]))
+    assert watch.done and watch.converged
+    assert state[0] * (1 - ratio) == pytest.approx(1, rel=2e-3)
+    assert watch.iterations <= most
+    assert "converged" in watch.reason
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4, 1e-5])
+def test_what_is_missing_is_below_the_tolerance(tolerance):
+    generator = np.random.default_rng(0)
+    operator = generator.random((20, 20))
+    operator *= 0.8 / np.abs(np.linalg.eigvals(operator)).max()
+    source = generator.random(20)
+    state, watch = run(operator, source, tolerance)
+    limit = np.linalg.solve(np.eye(20) - operator, source)
+    assert watch.converged
+    assert np.linalg.norm(state - limit) / np.linalg.norm(limit) < 1.5 * tolerance
+
+
+@pytest.mark.parametrize("ratios", [(0.9, 0.5), (0.95, 0.9), (0.99, 0.3), (0.9, -0.5)])
+def test_two_modes(ratios):
+    source = np.array([1.0, 1.0])
+    state, watch = run(np.diag(ratios), source)
+    limit = source / (1 - np.array(ratios))
+    assert watch.converged
+    assert np.linalg.norm(state - limit) / np.linalg.norm(limit) < 4e-3
+
+
+def test_a_bright_but_small_mode_that_decays_fast_does_not_fool_it():
+    """Direct light is a hundred times what still bounces; the slow mode must still be waited for."""
+    source = np.array([100.0, 1.0])
+    state, watch = run(np.diag([0.1, 0.98]), source)
+    limit = source / (1 - np.array([0.1, 0.98]))
+    assert watch.converged
+    assert np.linalg.norm(state - limit) / np.linalg.norm(limit) < 4e-3
+
+
+def test_light_that_is_never_lost_stops_at_the_limit():
+    _state, watch = run(np.array([[1.0]]), np.array([1.0]))
+    assert watch.done and not watch.converged
+    assert watch.iterations == AUTO_LIMIT + 1
+    assert "not converged" in watch.reason and "base colour" in watch.reason
+
+
+def test_light_that_grows_stops_too():
+    _state, watch = run(np.array([[1.001]]), np.array([1.0]))
+    assert watch.done and not watch.converged
+
+
+def test_no_light_at_all():
+    state, watch = run(np.array([[0.5]]), np.array([0.0]))
+    assert watch.converged and state[0] == 0
+    assert watch.iterations <= 3
+
+
+@pytest.mark.parametrize("bounces", [0, 1, 7])
+def test_a_number_of_bounces_is_kept_exactly(bounces):
+    state, watch = run(np.array([[0.5]]), np.array([1.0]), bounces=bounces)
+    assert watch.iterations == bounces + 1 and watch.done and watch.converged
+    assert state[0] == pytest.approx(sum(0.5**i for i in range(bounces + 1)), rel=1e-12)
+    assert f"{bounces} bounces" in watch.reason

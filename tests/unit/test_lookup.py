@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reading the field: exact where it must be, between nodes, past the box, and around walls."""
+
+import numpy as np
+import pytest
+from gridlight.core import lookup
+from gridlight.core.conventions import CULLED, DEPTH_EDGE, INVALID
+from gridlight.core.cubemap import octahedral_decode
+from gridlight.core.field import Field
+from gridlight.core.grid import Grid
+
+
+def open_field(resolution=(4, 3, 3), matrix=None, bands=3):
+    """A field whose probes see nothing near."""
+    matrix = np.diag([3.0, 2, 2, 1]) if matrix is None else matrix
+    field = Field.empty(Grid(matrix, resolution), bands)
+    field.depth[..., 0] = lookup.depth_clamp(field.grid)
+    field.depth[..., 1] = lookup.depth_clamp(field.grid) ** 2
+    return field
+
+
+def points_and_normals(count=200, reach=1.0, seed=0):
+    generator = np.random.default_rng(seed)
+    normals = generator.normal(size=(count, 3))
+    return generator.uniform(-reach, reach, (count, 3)) * [3, 2, 2], normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def depth_of(distance_along):
+    """(DEPTH_EDGE², 2) moments of a distance given as a function of directions."""
+    centre = (np.arange(DEPTH_EDGE) + 0.5) * 2 / DEPTH_EDGE - 1
+    u, v = np.meshgrid(centre, centre)
+    distance = distance_along(octahedral_decode(np.stack([u.ravel(), v.ravel()], axis=1)))
+    return np.stack([distance, distance**2], axis=1)
+
+
+def test_uniform_light_is_uniform_everywhere():
+    field = open_field()
+    field.coefficients[:, 0] = np.array([1, 2, 3]) * np.sqrt(4 * np.pi)
+    points, normals = points_and_normals(reach=3.0)
+    np.testing.assert_allclose(lookup.irradiance(field, points, normals), np.tile(np.pi * np.array([1, 2, 3]), (200, 1)), rtol=1e-6)
+
+
+def test_at_a_node_the_field_is_the_nodes():
+    field = open_field()
+    field.coefficients[:, 0, 0] = np.arange(field.grid.count)
+    normals = np.tile([0, 0, 1.0], (field.grid.count, 1))
+    found = lookup.irradiance(field, field.grid.positions(), normals)[:, 0]
+    np.testing.assert_allclose(found, np.arange(field.grid.count) * np.pi * 0.28209479177387814, rtol=1e-9, atol=1e-9)
+
+
+def test_linear_light_is_reproduced_in_open_space():
+    """Trilinear interpolation is exact for functions linear in x, y and z."""
+    rotation, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = rotation * [3, 2, 2], (5, 6, 7)
+    field = open_field((4, 3, 5), matrix)
+    slope = np.array([0.3, -0.2, 0.1])
+    field.coefficients[:, 0] = (10 + field.grid.positions() @ slope)[:, None] / (np.pi * 0.28209479177387814)
+    inside, normals = points_and_normals(reach=0.99)
+    points = inside @ rotation.T + (5, 6, 7)
+    np.testing.assert_allclose(lookup.irradiance(field, points, normals)[:, 0], 10 + points @ slope, rtol=1e-5)
+
+
+def test_weights_sum_to_one_whatever_is_seen():
+    field = open_field()
+    generator = np.random.default_rng(2)
+    field.depth[..., 0] = generator.uniform(0.01, 2, field.depth.shape[:2])
+    field.depth[..., 1] = field.depth[..., 0] ** 2
+    field.state[generator.random(len(field.state)) < 0.3] = CULLED
+    field.state[generator.random(len(field.state)) < 0.3] = INVALID
+    nodes, weights = lookup.lookup_weights(field, *points_and_normals(1000, 2.0))
+    np.testing.assert_allclose(weights.sum(axis=1), 1, rtol=1e-12)
+    assert (weights >= 0).all() and nodes.min() >= 0 and nodes.max() < field.grid.count
+
+
+def test_outside_the_box_the_nearest_face_counts():
+    field = open_field()
+    field.coefficients[:] = np.random.default_rng(3).random(field.coefficients.shape)
+    points, normals = points_and_normals(100, 4.0)
+    clamped = np.clip(points, [-3, -2, -2], [3, 2, 2])
+    np.testing.assert_allclose(lookup.irradiance(field, points, normals), lookup.irradiance(field, clamped, normals), rtol=1e-5)
+
+
+@pytest.mark.parametrize("resolution", [(1, 1, 1), (1, 3, 1), (2, 1, 4)])
+def test_axes_with_one_node(resolution):
+    field = open_field(resolution)
+    field.coefficients[:, 0] = 1
+    found = lookup.irradiance(field, *points_and_normals())
+    np.testing.assert_allclose(found, np.pi * 0.28209479177387814, rtol=1e-6)
+
+
+def test_a_probe_behind_a_wall_does_not_leak():
+    """Two probes, a wall half way: the dark side must not see the bright probe's light."""
+    field = open_field((2, 1, 1), np.diag([1.0, 1, 1, 1]))
+    field.coefficients[1, 0] = 100
+    for node, side in ((0, 1), (1, -1)):
+        field.depth[node] = depth_of(lambda d, side=side: np.where(d[:, 0] * side > 1e-3, np.minimum(1 / np.maximum(d[:, 0] * side, 1e-3), 4), 4.0))
+    left = np.array([[-0.05, 0, 0], [-0.3, 0.2, 0.1]])
+    found = lookup.irradiance(field, left, np.tile([-1.0, 0, 0], (2, 1)))
+    assert (found < 0.05 * 100).all(), "less than a twentieth of what open space would show"
+    right = lookup.irradiance(field, -left, np.tile([1.0, 0, 0], (2, 1)))
+    assert (right > 0.9 * 100 * np.pi * 0.282).all()
+
+
+def test_invalid_probes_lend_no_light_where_others_do():
+    field = open_field()
+    field.coefficients[:, 0] = 1
+    field.state[::2] = INVALID
+    field.coefficients[::2] = 1e3
+    found = lookup.irradiance(field, *points_and_normals(100))
+    np.testing.assert_allclose(found, np.pi * 0.28209479177387814, rtol=0.1)
+
+
+def test_culled_probes_count_as_seen():
+    field = open_field()
+    field.depth[:] = 0.01  # would see nothing
+    field.state[:] = CULLED
+    field.coefficients[:, 0] = np.arange(field.grid.count)[:, None]
+    _nodes, weights = lookup.lookup_weights(field, *points_and_normals(100))
+    field.state[:] = 1
+    field.depth[..., 0], field.depth[..., 1] = 10, 100
+    _nodes, plain = lookup.lookup_weights(field, *points_and_normals(100))
+    np.testing.assert_allclose(weights, plain, rtol=1e-9)
+
+
+def test_the_depth_map_has_no_seams():
+    """A smooth distance over the sphere, sampled across the folds of the map, stays smooth."""
+    field = open_field((1, 1, 1))
+    field.depth[0] = depth_of(lambda d: 2 + d @ [0.3, 0.5, -0.4])
+    angle = np.linspace(0, 2 * np.pi, 4000)
+    for axis in range(3):
+        circle = np.roll(np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1), axis, axis=1)
+        sampled = lookup._sample_moments(field.depth, np.zeros(len(circle), int), circle)[:, 0]
+        assert np.abs(np.diff(sampled)).max() < 0.01
+        assert np.abs(sampled - (2 + circle @ [0.3, 0.5, -0.4])).max() < 0.12
