@@ -152,6 +152,12 @@ def bake_steps(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, repo
         with _timed(result, "light"):
             backend.finish_iteration()
 
+    if backend.scene.emitter_count:
+        for index in range(batches.count):
+            with _timed(result, "light"):
+                backend.add_emission(batches.lit(index))
+            yield
+
     with _timed(result, "light"):
         result.iterations = convergence.iterations
         result.converged = convergence.converged

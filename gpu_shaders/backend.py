@@ -16,6 +16,7 @@ from ..core import lookup
 from ..core.conventions import CULLED, DEPTH_EDGE
 from ..core.cubemap import texel_solid_angles
 from ..core.dilation import nearest_active
+from ..core.emitters import sampling_density
 from ..core.grid import Grid
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
@@ -25,7 +26,8 @@ from .raster_capture import RasterCapture
 from .scene_textures import SceneTextures
 from .textures import allocate, layers, read, upload
 
-_GROUP = 64  # threads that share a probe in light_iterate_comp
+_GROUP = 64  # threads that share a probe where its texels are summed
+_EMITTER_SAMPLES = 256  # points on emitters that each probe looks at besides its texels
 # Kept images of texel surfaces. Albedo is 32 bit: in a bright room an error of 1e-4 in 0.99 is one of 1e-2 in the light.
 _SURFACE_FORMATS = {"geometry": "RGBA32F", "albedo": "RGBA32F", "emission": "RGBA32F", "source": "RGBA32F",
                     "weights0": "RGBA16F", "weights1": "RGBA16F"}
@@ -58,7 +60,7 @@ class GpuBackend:
         self.settings = settings
         self.face = settings.face
         self.coefficients = settings.bands**2
-        self.scene = SceneTextures(snapshot, grid.center)
+        self.scene = SceneTextures(snapshot, grid.center, sampling_density(snapshot, grid))
         self.object_count = max(len(snapshot.object_names), 1)
         self._object_flips = upload(np.zeros((self.object_count, 4)), "objects")
         weights = np.zeros((self.face * self.face, 4), np.float32)
@@ -214,16 +216,14 @@ class GpuBackend:
         self._dispatch_texels(shader, surfaces.count)
 
     def direct_light(self, surfaces: Surfaces) -> None:
-        """Fills source: emission plus reflected direct light of all lights."""
-        shader = program("direct_light_comp", FACE=self.face, **self.scene.ray_defines)
-        self.scene.bind_rays(shader)
-        self.scene.bind(shader, "lights")
+        """Fills source: reflected direct light of lamps and sampled emitters, and emission as far as the field carries it."""
+        shader = program("direct_light_comp", FACE=self.face, **self.scene.light_defines)
+        self.scene.bind_lights(shader)
         shader.uniform_sampler("probe_slots", self._probe_slots)
         for name in ("geometry", "albedo", "emission"):
             shader.uniform_sampler(name, surfaces.textures[name])
         shader.image("source", surfaces.textures["source"])
         self._set_range(shader, surfaces)
-        shader.uniform_int("light_count", (self.scene.light_count,))
         shader.uniform_int("samples", (self.settings.samples,))
         shader.uniform_int("seed", (self.settings.seed,))
         self._dispatch_texels(shader, surfaces.count)
@@ -243,12 +243,28 @@ class GpuBackend:
         shader.uniform_int("read_field", (int(read_field),))
         gpu.compute.dispatch(shader, surfaces.count, 1, 1)
 
+    def add_emission(self, surfaces: Surfaces) -> None:
+        """Adds what these probes see of sampled emitters to the newest field."""
+        shader = program("emission_project_comp", FACE=self.face, BANDS=self.settings.bands, COEFFICIENTS=self.coefficients,
+                         GROUP=_GROUP, **self.scene.light_defines)
+        self.scene.bind_surfaces(shader)
+        self.scene.bind_emitters(shader)
+        shader.uniform_sampler("probe_slots", self._probe_slots)
+        shader.uniform_sampler("texel_weights", self._texel_weights)
+        for name in ("geometry", "emission"):
+            shader.uniform_sampler(name, surfaces.textures[name])
+        shader.image("field", self._field[0])
+        self._set_range(shader, surfaces)
+        shader.uniform_int("samples", (_EMITTER_SAMPLES,))
+        shader.uniform_int("seed", (self.settings.seed,))
+        gpu.compute.dispatch(shader, surfaces.count, 1, 1)
+
     def gather(self, surfaces: Surfaces) -> None:
         """Adds to source what really traced bounces bring; afterwards iterate without reading the field."""
         shader = program("gather_comp", FACE=self.face, BANDS=self.settings.bands, COEFFICIENTS=self.coefficients,
-                         **self.scene.surface_defines, STACK_SIZE=self.scene.hierarchy.stack_size)
+                         **(self.scene.surface_defines | self.scene.light_defines | {"HAS_IMAGES": self.scene.has_images}))
         self.scene.bind_surfaces(shader)
-        self.scene.bind(shader, "lights")
+        self.scene.bind_lights(shader)
         shader.uniform_block("grid_info", self._grid_info)
         for name, texture in (("grid_nodes", self._grid_nodes), ("depth_moments", self._moments), ("field_in", self._field[0]),
                               ("world_texels", self._world_texels), ("probe_slots", self._probe_slots)):
@@ -257,7 +273,7 @@ class GpuBackend:
             shader.uniform_sampler(name, surfaces.textures[name])
         shader.image("source", surfaces.textures["source"])
         self._set_range(shader, surfaces)
-        for name, value in (("light_count", self.scene.light_count), ("samples", self.settings.samples),
+        for name, value in (("samples", self.settings.samples),
                             ("bounces", self.settings.gather), ("seed", self.settings.seed)):
             shader.uniform_int(name, (value,))
         self._dispatch_texels(shader, surfaces.count)

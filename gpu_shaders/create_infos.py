@@ -125,16 +125,43 @@ def lookup_weights_comp(info, defines):
     return {"compute": ["data_lib", "cubemap_lib", "lookup_lib", "lookup_weights_comp"]}
 
 
+def _emitters(info, defines: dict, first: int) -> int:
+    """Sampled emitters, where the scene has any; their materials are surfaces to the shader."""
+    if "HAS_EMITTERS" not in defines:
+        return first
+    _ints(info, "emitter_count")
+    return _samplers(info, "emitters", first=first)
+
+
+def _light_files(defines: dict) -> list[str]:
+    """What it takes to light a point: rays, lamps and sampled emitters."""
+    surfaces = ["surface_lib"] if "HAS_EMITTERS" in defines or "HAS_ALPHA" in defines else []
+    emitters = ["emitter_lib"] if "HAS_EMITTERS" in defines else []
+    return ["random_lib", *surfaces, "ray_lib", "direct_light_lib", *emitters]
+
+
 def direct_light_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
-    slot = _scene(info, defines, attributes=False)
+    slot = _scene(info, defines, attributes="HAS_EMITTERS" in defines)
+    slot = _emitters(info, defines, slot)
     slot = _samplers(info, "lights", "probe_slots", first=slot)
     _samplers(info, "geometry", "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "source", layered=True)
     _ints(info, "first_slot", "first_layer", "light_count", "samples", "seed")
     info.local_group_size(8, 8, 1)
-    return {"compute": ["data_lib", "cubemap_lib", "random_lib", *_surface_files(defines), "ray_lib", "direct_light_lib",
-                        "direct_light_comp"]}
+    return {"compute": ["data_lib", "cubemap_lib", *_light_files(defines), "direct_light_comp"]}
+
+
+def emission_project_comp(info, defines):
+    slot = _scene(info, defines)
+    slot = _emitters(info, defines, slot)
+    slot = _samplers(info, "probe_slots", "texel_weights", first=slot)
+    _samplers(info, "geometry", "emission", kind="FLOAT_2D_ARRAY", first=slot)
+    _image(info, 0, "field", access="READ+WRITE")
+    _ints(info, "first_slot", "first_layer", "samples", "seed")
+    info.local_group_size(int(defines["GROUP"]), 1, 1)
+    return {"compute": ["data_lib", "cubemap_lib", "random_lib", "spherical_harmonics_lib", "surface_lib", "ray_lib", "emitter_lib",
+                        "emission_project_comp"]}
 
 
 def light_iterate_comp(info, defines):
@@ -188,11 +215,12 @@ def preview_comp(info, defines):
 def gather_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
     slot = _scene(info, defines)
+    slot = _emitters(info, defines, slot)
     slot = _lookup(info, slot)
     slot = _samplers(info, "lights", "field_in", "world_texels", "probe_slots", first=slot)
     _samplers(info, "geometry", "albedo", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "source", layered=True, access="READ+WRITE")
     _ints(info, "first_slot", "first_layer", "light_count", "samples", "bounces", "seed")
     info.local_group_size(8, 8, 1)
-    return {"compute": ["data_lib", "cubemap_lib", "random_lib", "spherical_harmonics_lib", "surface_lib", "ray_lib",
-                        "direct_light_lib", "lookup_lib", "field_lib", "gather_comp"]}
+    return {"compute": ["data_lib", "cubemap_lib", "spherical_harmonics_lib", *_light_files(defines | {"HAS_ALPHA": True}),
+                        "lookup_lib", "field_lib", "gather_comp"]}

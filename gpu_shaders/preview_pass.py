@@ -54,8 +54,7 @@ class PreviewPass:
         shows the field's light alone.
         """
         shader = program("preview_comp", FACE=_BACKGROUND_FACE, BANDS=self._field.bands,
-                         COEFFICIENTS=self._field.bands**2, **self._scene.surface_defines,
-                         STACK_SIZE=self._scene.hierarchy.stack_size)
+                         COEFFICIENTS=self._field.bands**2, **self._scene.surface_defines)
         pictures = [gpu.types.GPUTexture((width, height), format="RGBA32F") for _ in range(2)]
         view, centres = self._view(camera)
         view_info = gpu.types.GPUUniformBuf(gpu.types.Buffer("FLOAT", view.size, view.reshape(-1)))

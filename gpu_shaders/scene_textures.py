@@ -22,7 +22,8 @@ class SceneTextures:
     ``defines`` are what every shader that touches surfaces must be compiled with; ``bind`` hands it the textures it declares.
     """
 
-    def __init__(self, snapshot: SceneSnapshot, origin: np.ndarray):
+    def __init__(self, snapshot: SceneSnapshot, origin: np.ndarray, emitter_density: np.ndarray):
+        """``origin`` (3,) world metres; ``emitter_density`` (T,) per m², from core/emitters.py."""
         corners = (snapshot.triangle_positions - origin).astype(np.float32)
         self.hierarchy = bvh.build(corners)
         order = self.hierarchy.order
@@ -32,6 +33,8 @@ class SceneTextures:
         self.has_alpha = bool(clips.any())
         self.has_images = bool(snapshot.images)
         self.light_count = len(snapshot.lights)
+        density = emitter_density[order]
+        self.emitter_count = int((density > 0).sum())
 
         material = np.clip(snapshot.material_index[order], 0, max(len(snapshot.materials) - 1, 0))
         rows = np.zeros((self.triangle_count, 3, 4), np.float32)
@@ -41,26 +44,32 @@ class SceneTextures:
         self._textures = {
             "bvh_nodes": upload(self.hierarchy.nodes, "hierarchy nodes"),
             "triangle_corners": upload(rows, "triangle corners"),
-            "triangle_attributes": upload(_attributes(snapshot, order, material, self.corners), "triangle attributes"),
+            "triangle_attributes": upload(
+                _attributes(snapshot, order, material, self.corners, density), "triangle attributes"),
             "materials": upload(_materials(snapshot), "materials"),
+            "emitters": upload(_emitters(density, self.corners), "emitters"),
             "lights": upload(pack_lights(snapshot.lights, origin), "lights"),
         }
         if self.has_images:
             table, texels = _pack_images(snapshot.images)
             self._textures["image_table"] = upload(table, "images")
             self._textures["image_texels"] = upload(texels, "image texels", "RGBA16F")
-        self._defines = {"HAS_ALPHA": self.has_alpha, "HAS_IMAGES": self.has_images,
-                         "STACK_SIZE": self.hierarchy.stack_size}
 
     @property
     def surface_defines(self) -> dict:
-        return {key: self._defines[key] for key in ("HAS_ALPHA", "HAS_IMAGES")}
+        """For shaders that ask what surfaces are made of, and may trace rays."""
+        return {"HAS_ALPHA": self.has_alpha, "HAS_IMAGES": self.has_images, "STACK_SIZE": self.hierarchy.stack_size}
 
     @property
     def ray_defines(self) -> dict:
-        """For shaders that trace rays; images matter to them only where surfaces have holes."""
-        return {"HAS_ALPHA": self.has_alpha, "HAS_IMAGES": self.has_alpha and self.has_images,
-                "STACK_SIZE": self.hierarchy.stack_size}
+        """For shaders that only trace rays; images matter to them only where surfaces have holes."""
+        return self.surface_defines | {"HAS_IMAGES": self.has_alpha and self.has_images}
+
+    @property
+    def light_defines(self) -> dict:
+        """For shaders that light points: sampled emitters bring their materials along."""
+        defines = self.surface_defines if self.emitter_count else self.ray_defines
+        return defines | {"HAS_EMITTERS": self.emitter_count > 0}
 
     def bind(self, shader, *names: str) -> None:
         for name in names:
@@ -74,6 +83,20 @@ class SceneTextures:
             if self.has_images:
                 self.bind(shader, "image_table", "image_texels")
 
+    def bind_lights(self, shader) -> None:
+        """Binds what a shader compiled with ``light_defines`` declares."""
+        if self.emitter_count:
+            self.bind_surfaces(shader)
+            self.bind_emitters(shader)
+        else:
+            self.bind_rays(shader)
+        self.bind(shader, "lights")
+        shader.uniform_int("light_count", (self.light_count,))
+
+    def bind_emitters(self, shader) -> None:
+        self.bind(shader, "emitters")
+        shader.uniform_int("emitter_count", (self.emitter_count,))
+
     def bind_surfaces(self, shader) -> None:
         """Binds what a shader compiled with ``surface_defines`` declares."""
         self.bind(shader, "bvh_nodes", "triangle_corners", "triangle_attributes", "materials")
@@ -81,7 +104,8 @@ class SceneTextures:
             self.bind(shader, "image_table", "image_texels")
 
 
-def _attributes(snapshot: SceneSnapshot, order: np.ndarray, material: np.ndarray, corners: np.ndarray) -> np.ndarray:
+def _attributes(snapshot: SceneSnapshot, order: np.ndarray, material: np.ndarray, corners: np.ndarray,
+                density: np.ndarray) -> np.ndarray:
     """(T, 5, 4) rows of surface_lib's triangle_attributes, in leaf order."""
     uvs = snapshot.corner_uvs[order].astype(np.float32)
     rows = np.zeros((len(order), 5, 4), np.float32)
@@ -91,6 +115,19 @@ def _attributes(snapshot: SceneSnapshot, order: np.ndarray, material: np.ndarray
     rows[:, 2, 3] = _uv_scale(corners, uvs)
     rows[:, 3] = uvs[:, :2].reshape(-1, 4)
     rows[:, 4, :2] = uvs[:, 2]
+    rows[:, 4, 2] = density
+    return rows
+
+
+def _emitters(density: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """(E, 4) rows of emitter_lib's emitters for triangles (T, 3, 3) in leaf order with ``density`` (T,)."""
+    triangle = np.flatnonzero(density > 0)
+    edge = (corners[triangle, 1:] - corners[triangle, :1]).astype(np.float64)
+    area = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1) / 2
+    rows = np.zeros((len(triangle), 4), np.float32)
+    rows[:, 0] = triangle
+    rows[:, 1] = np.cumsum(density[triangle] * area)
+    rows[:, 2] = density[triangle]
     return rows
 
 

@@ -2,8 +2,8 @@
  * field is read. The grid's interpolation error then reaches the probe only after that many diffuse reflections.
  *
  * Dispatch: x = columns, y = 6·FACE rows, z = probes; groups of 8×8×1. Reads layer first_layer + probe of geometry and albedo, adds to
- * `source`. Directions are cosine-weighted (Malley), direct light is sampled at every vertex (next-event estimation), emission is found by
- * the paths themselves. The key of a number is (probe, texel, bounce, seed): any split of the work gives the same bytes.
+ * `source`. Directions are cosine-weighted (Malley), direct light of lamps and small emitters is sampled at every vertex
+ * (next-event estimation), emission that the field carries is found by the paths. The key of a number is (probe, texel, bounce, seed): any split of the work gives the same bytes.
  */
 
 vec3 sample_cosine(vec3 normal, vec2 u)
@@ -20,6 +20,9 @@ vec3 direct_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key)
   for (int light = 0; light < light_count; light++) {
     irradiance += light_irradiance(light, point, origin, normal, key + uvec3(0u, 0u, uint(light) * 0x9E3779B9u), 1);
   }
+#ifdef HAS_EMITTERS
+  irradiance += emitter_irradiance(point, origin, normal, key, 1);
+#endif
   return irradiance;
 }
 
@@ -46,7 +49,7 @@ vec3 trace_path(vec3 origin, vec3 normal, uvec3 key, int path)
       return radiance + throughput * element(world_texels, texel.y * FACE + texel.x).rgb;
     }
     Surface surface = resolve_surface(hit.triangle, hit.barycentric, origin, direction, 0.5);
-    radiance += throughput * surface.emission;
+    radiance += surface.emitter_density == 0.0 ? throughput * surface.emission : vec3(0.0);
     throughput *= surface.albedo;
     if (throughput == vec3(0.0)) {
       return radiance;

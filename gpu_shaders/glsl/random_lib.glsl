@@ -23,3 +23,10 @@ vec2 sample_r2(uvec3 key, int index)
   uvec2 place = pcg3d(key).xy + uvec2(3242174889u, 2447445414u) * uint(index);
   return vec2(place >> 8u) * (1.0 / 16777216.0);
 }
+
+/* Three numbers in [0, 1) from the three-dimensional sequence. */
+vec3 sample_r3(uvec3 key, int index)
+{
+  vec3 start = vec3(pcg3d(key) >> 8u) * (1.0 / 16777216.0);
+  return fract(start + vec3(0.8191725133961645, 0.6710436067037893, 0.5497004779019703) * float(index));
+}

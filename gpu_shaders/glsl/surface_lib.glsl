@@ -1,7 +1,8 @@
 /* What a hit surface is made of: attributes of a triangle, its material, its images.
  *
  * Layouts are written by scene_textures.py:
- *   triangle_attributes, 5 elements a triangle: normals and (material, object, texture scale) in w; uv0 uv1; uv2
+ *   triangle_attributes, 5 elements a triangle: normals and (material, object, texture scale) in w; uv0 uv1;
+ *     uv2 and the density with which the triangle is sampled as an emitter (core/emitters.py)
  *   materials, 3 elements: diffuse albedo, base image | emission, emission image | alpha, threshold, alpha image, alpha from colour
  *   image_table, 1 element: first row in image_texels, width, height, extension
  *   image_texels: linear RGBA, mip levels of an image one after the other
@@ -86,6 +87,7 @@ struct Surface {
   int object;
   vec3 albedo;
   vec3 emission;
+  float emitter_density; /* per m²; 0 where the emission is carried by the field */
 };
 
 /* Surface at `barycentric` of `triangle` seen along `direction`; `spread` is the angular width of the view, radians. */
@@ -109,6 +111,7 @@ Surface resolve_surface(int triangle, vec2 barycentric, vec3 origin, vec3 direct
   vec4 emission = element(materials, 3 * material + 1);
   surface.albedo = base.rgb;
   surface.emission = emission.rgb;
+  surface.emitter_density = element(triangle_attributes, 5 * triangle + 4).z;
 #ifdef HAS_IMAGES
   if (max(base.w, emission.w) >= 0.0) {
     vec2 uv = triangle_uv(triangle, barycentric);

@@ -5,7 +5,7 @@
  *   geometry  octahedral normal, signed distance (negative: back face; NO_SURFACE: background), object;
  *             lookup_weights_comp later puts the lookup's first node in place of the object
  *   albedo    diffuse albedo
- *   emission  emitted radiance; the world's radiance where the texel sees background
+ *   emission  emitted radiance, density where it is sampled as a light, 0 where the field carries it; the world's radiance where the texel sees background
  */
 
 void main()
@@ -29,5 +29,5 @@ void main()
   float distance = max(dot(surface.position - origin, direction), 1.0e-20);
   imageStore(geometry, target, vec4(octahedral_encode(surface.normal), surface.back ? -distance : distance, float(surface.object)));
   imageStore(albedo, target, vec4(surface.albedo, 0.0));
-  imageStore(emission, target, vec4(surface.emission, 0.0));
+  imageStore(emission, target, vec4(surface.emission, surface.emitter_density));
 }

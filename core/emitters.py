@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Emissive surfaces that are sampled like lights, because the grid cannot resolve them.
+
+The field carries light of emissive surfaces from probe to probe as well as its cells are fine: a luminous ceiling is carried
+exactly, a lamp smaller than a cell is smeared over it, and a wall right beside the lamp gets a fraction of its light.
+Emitters smaller than a cell are therefore sampled: as lights at texel surfaces, and as extra directions in the probes themselves,
+where one ray per texel may miss them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .conventions import LUMINANCE
+from .grid import Grid
+from .snapshot import SceneSnapshot
+
+_MOST_AREA_SHARE = 0.25  # of all surface: a scene that glows all over is resolved by any grid
+
+
+def sampling_density(snapshot: SceneSnapshot, grid: Grid) -> np.ndarray:
+    """(T,) probability density per m² with which a point on each triangle is chosen as a light sample; integrates to 1.
+
+    Proportional to luminance of the emission; 0 everywhere where nothing is sampled. An object's emission is sampled when the area that
+    glows is no larger than the square of a cell's diagonal.
+    """
+    luminance = _luminance(snapshot)[snapshot.material_index]
+    density = np.zeros(len(snapshot.triangles))
+    glowing = np.flatnonzero(luminance > 0)
+    if not len(glowing):
+        return density
+    corners = snapshot.vertices[snapshot.triangles]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    per_object = np.bincount(snapshot.object_index[glowing], area[glowing], len(snapshot.object_names))
+    small = per_object[snapshot.object_index[glowing]] <= float((grid.cell_size() ** 2).sum())
+    sampled = glowing[small & (area[glowing] > 0)]
+    if area[sampled].sum() > _MOST_AREA_SHARE * area.sum():
+        return density
+    power = area[sampled] * luminance[sampled]
+    if power.sum() > 0:
+        density[sampled] = luminance[sampled] / power.sum()
+    return density
+
+
+def _luminance(snapshot: SceneSnapshot) -> np.ndarray:
+    """(M,) mean luminance that each material emits; at least one entry."""
+    values = np.zeros(max(len(snapshot.materials), 1))
+    for index, material in enumerate(snapshot.materials):
+        emission = np.maximum(np.array(material.emission, float), 0.0)
+        if material.emission_image >= 0:
+            emission = emission * snapshot.images[material.emission_image].pixels[..., :3].mean(axis=(0, 1))
+        values[index] = emission @ LUMINANCE
+    return values
