@@ -9,8 +9,8 @@ Layout, the same as Cycles' environment texture and panoramic camera and as ``co
     u:   0     ¼     ½     ¾     1             seen from inside with +Z up, so u grows to the right
         −X    +Y    +X    −Y    −X
 
-A pixel is a constant over its rectangle in (u, v). All integrals take that literally: a pixel's share of a basis function
-is integrated over the rectangle by sub-samples with exact solid angles, not taken at its centre.
+A pixel is a constant over its rectangle in (u, v). All integrals take that literally: a pixel's share of a basis
+function is integrated over the rectangle by sub-samples with exact solid angles, not taken at its centre.
 """
 
 from functools import lru_cache
@@ -56,7 +56,8 @@ def project_panorama(image: np.ndarray, bands: int) -> np.ndarray:
 
 
 def panorama_irradiance(image: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """(N, 3) float64 irradiance of surfaces facing ``normals`` (N, 3, unit) under the panorama ``image`` (height, width, 3).
+    """(N, 3) float64 irradiance of surfaces facing ``normals`` (N, 3, unit) under the panorama ``image`` (height,
+    width, 3).
 
     Integrates max(0, n·d) over every pixel directly, so nothing is lost to a truncated SH series.
     """

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Path-traced panoramas of a scene by Cycles: the reference that bakes are measured against.
 
-The settings remove everything by which Cycles trades truth for speed: clamping, light thresholds, filters wider than a pixel,
-adaptive sampling, denoising, switched-off caustics. Light objects are hidden from the camera because probes hold the light
-of surfaces and of the world only.
+The settings remove everything by which Cycles trades truth for speed: clamping, light thresholds, filters wider than a
+pixel, adaptive sampling, denoising, switched-off caustics. Light objects are hidden from the camera because probes hold
+the light of surfaces and of the world only.
 """
 
 from __future__ import annotations
@@ -72,7 +72,8 @@ def panoramic_camera(camera: bpy.types.Object) -> None:
 
 
 def unbiased_settings(scene: bpy.types.Scene, samples: int, bounces: int) -> None:
-    """Make ``scene`` render with Cycles, ``samples`` per pixel, without any shortcut that changes the expected value."""
+    """Make ``scene`` render with Cycles, ``samples`` per pixel, without any shortcut that changes the expected value.
+    """
     scene.render.engine = "CYCLES"
     scene.render.use_persistent_data = True
     cycles = scene.cycles

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Access to the evaluated scene, either as a render sees it or as the viewport does.
 
-``evaluated_depsgraph_get()`` is a viewport depsgraph: it holds what the viewport shows, with viewport subdivision levels and
-without objects that are only hidden there. A bake is judged against a render, so it reads the RENDER depsgraph, and the only
-place where Blender hands that one to Python is the ``render()`` callback of a render engine. The engine here draws nothing:
-a render with it on a copy of the scene costs milliseconds.
+``evaluated_depsgraph_get()`` is a viewport depsgraph: it holds what the viewport shows, with viewport subdivision
+levels and without objects that are only hidden there. A bake is judged against a render, so it reads the RENDER
+depsgraph, and the only place where Blender hands that one to Python is the ``render()`` callback of a render engine.
+The engine here draws nothing: a render with it on a copy of the scene costs milliseconds.
 """
 
 from __future__ import annotations
@@ -71,7 +71,9 @@ def as_in_viewport(
 
 
 def rendered_objects(view_layer: bpy.types.ViewLayer) -> set[int]:
-    """``session_uid`` of the objects of ``view_layer`` that neither they themselves nor all their collections keep out of renders."""
+    """``session_uid`` of the objects of ``view_layer`` that neither they themselves nor all their collections keep out
+    of renders.
+    """
     rendered = set()
     pending = [view_layer.layer_collection]
     while pending:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a socket of a material evaluates to, rendered by Cycles on a unit square.
 
-Seen from above, the square runs from −½ to ½ in x and y; it is tilted so that z takes all those values too, which shows what
-varies with height. Its UVs run from 0 to 1 as its picture does, its Generated coordinates along all three axes.
+Seen from above, the square runs from −½ to ½ in x and y; it is tilted so that z takes all those values too, which shows
+what varies with height. Its UVs run from 0 to 1 as its picture does, its Generated coordinates along all three axes.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Evaluated meshes and their instances as world-space triangles.
 
-Every mesh datablock is read once, whatever the number of its instances, in its own space and with bulk reads only; instances
-are transformed together in float64.
+Every mesh datablock is read once, whatever the number of its instances, in its own space and with bulk reads only;
+instances are transformed together in float64.
 """
 
 from __future__ import annotations
@@ -41,7 +41,9 @@ class WorldTriangles:
 
 
 def read_mesh(mesh: bpy.types.Mesh) -> MeshArrays:
-    """Read an evaluated mesh. Triangles without area and those with a corner that is not finite are dropped and counted."""
+    """Read an evaluated mesh. Triangles without area and those with a corner that is not finite are dropped and
+    counted.
+    """
     vertices = _read(mesh.attributes["position"].data, "vector", (len(mesh.vertices), 3), np.float32) if mesh.vertices \
         else np.empty((0, 3), np.float32)
     corner_vertices = _read(mesh.attributes[".corner_vert"].data, "value", (len(mesh.loops),), np.int32) if mesh.loops \
@@ -62,8 +64,8 @@ def read_mesh(mesh: bpy.types.Mesh) -> MeshArrays:
 def place(mesh: MeshArrays, corner_uvs: np.ndarray, matrices: np.ndarray) -> WorldTriangles:
     """Put instances of ``mesh`` into the world; ``matrices`` is (I, 4, 4) float64, ``corner_uvs`` (T, 3, 2) float32.
 
-    Mirroring transforms reverse the winding, so that triangles stay counter-clockwise from their front; normals go through the
-    inverse transpose, written with cofactors because that also holds for flattening transforms.
+    Mirroring transforms reverse the winding, so that triangles stay counter-clockwise from their front; normals go
+    through the inverse transpose, written with cofactors because that also holds for flattening transforms.
     """
     count, (vertex_count, triangle_count) = len(matrices), (len(mesh.vertices), len(mesh.triangles))
     axes = matrices[:, :3, :3]

@@ -9,13 +9,16 @@ import numpy as np
 from ..core.snapshot import Image
 from .notices import Notices
 
-# A probe's texel sees a patch of surface, never a single pixel of a large texture: images are box-filtered down to this edge.
+# A probe's texel sees a patch of surface, never a single pixel of a large texture: images are box-filtered down to this
+# edge.
 MAX_EDGE = 1024
 
 _CHUNK_ROWS = 256  # rows converted at a time, so that an 8192² texture does not need its float copies all at once
 
 _ENCODED = np.arange(256) / 255.0
-_SRGB_TO_LINEAR = np.where(_ENCODED <= 0.04045, _ENCODED / 12.92, ((_ENCODED + 0.055) / 1.055) ** 2.4).astype(np.float32)
+_SRGB_TO_LINEAR = np.where(_ENCODED <= 0.04045, _ENCODED / 12.92, ((_ENCODED + 0.055) / 1.055) ** 2.4).astype(
+    np.float32
+)
 _BYTE_TO_LINEAR = _ENCODED.astype(np.float32)
 
 
@@ -31,7 +34,8 @@ class ImageTable:
         self._indices: dict[tuple[int, str], int] = {}
 
     def pixels(self, image: bpy.types.Image, user: str) -> np.ndarray | None:
-        """(height, width, 4) float32 linear RGB (not premultiplied) and alpha; None, and a warning, where there are none.
+        """(height, width, 4) float32 linear RGB (not premultiplied) and alpha; None, and a warning, where there are
+        none.
 
         ``user`` names in the warning what wants the image, such as ``material 'Floor'``.
         """

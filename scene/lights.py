@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Light objects to ``core.snapshot.Light``, in its units.
 
-Factors as Cycles applies them: colour × temperature tint × 2^exposure × power, then per type. Nodes of a light multiply on top.
+Factors as Cycles applies them: colour × temperature tint × 2^exposure × power, then per type. Nodes of a light multiply
+on top.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ class LightTable:
     def add(self, item: bpy.types.Object, matrix: np.ndarray, name: str) -> None:
         """Add light object ``item`` placed by ``matrix`` (4, 4) float64, which for instances differs from its own.
 
-        Lights that add nothing to diffuse light are passed over: portals, those without power, those invisible to diffuse rays.
+        Lights that add nothing to diffuse light are passed over: portals, those without power, those invisible to
+        diffuse rays.
         """
         light = _read_light(item, matrix, name, self._node_tint(item.data), self._notices)
         if light is not None:
@@ -108,7 +110,8 @@ def _frame(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _point(data, _scale) -> dict:
-    # Without normalisation the sphere's radiance is energy/π whatever its size; one of radius 0 has that as its intensity.
+    # Without normalisation the sphere's radiance is energy/π whatever its size; one of radius 0 has that as its
+    # intensity.
     radius = float(data.shadow_soft_size)
     if data.normalize:
         unit = 1 / (4 * np.pi)
@@ -122,7 +125,8 @@ def _spot(data, scale) -> dict:
 
 
 def _sun(data, _scale) -> dict:
-    # Without normalisation the strength is the radiance of a disc of this apparent size, so the irradiance grows with it.
+    # Without normalisation the strength is the radiance of a disc of this apparent size, so the irradiance grows with
+    # it.
     unit = 1.0 if data.normalize or data.angle <= 0 else np.pi * np.sin(data.angle / 2) ** 2
     return {"unit": unit, "angle": float(data.angle)}
 

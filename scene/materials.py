@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Material datablocks to ``core.snapshot.Material``: one diffuse, emitting, possibly perforated surface each.
 
-``surface_shaders`` says what each kind of shader becomes. Here the result is laid out for the bake: one texture mapping per
-material (the base colour's, else the opacity's, else the emission's) and at most two textures.
+``surface_shaders`` says what each kind of shader becomes. Here the result is laid out for the bake: one texture mapping
+per material (the base colour's, else the opacity's, else the emission's) and at most two textures.
 """
 
 from __future__ import annotations
@@ -101,7 +101,9 @@ class MaterialTable:
         ))
 
     def _in_domain(self, name: str, role: str, value: Value, domain: Domain) -> Value:
-        """``value`` as it can be sampled with the material's one mapping: textures that lie elsewhere become their mean."""
+        """``value`` as it can be sampled with the material's one mapping: textures that lie elsewhere become their
+        mean.
+        """
         if value.is_constant or value.domain == domain:
             return value
         if value.domain.uv_map is not None:
@@ -160,7 +162,9 @@ def _rgba(color: Value, opacity: Value | None) -> np.ndarray:
     """(height, width, 4) float32: the pixels of ``color`` without its factor, ``opacity`` as alpha."""
     def join(rgb, alpha):
         shape = np.broadcast_shapes(rgb.shape[:2], alpha.shape[:2])
-        return np.concatenate([np.broadcast_to(np.maximum(rgb, 0), (*shape, 3)), np.broadcast_to(alpha, (*shape, 1))], axis=-1)
+        return np.concatenate(
+            [np.broadcast_to(np.maximum(rgb, 0), (*shape, 3)), np.broadcast_to(alpha, (*shape, 1))], axis=-1
+        )
 
     unscaled = Value(np.ones(1, np.float32), color.pixels, color.domain)
     return apply(join, unscaled, ONE if opacity is None else opacity).pixels

@@ -35,7 +35,8 @@ def find_socket(sockets, identifier: str):
 def resolve(socket: bpy.types.NodeSocket, scope: Scope | None):
     """What really feeds the input ``socket``: ``(socket, scope)``.
 
-    The result is the output socket of a node that computes something, or an input socket without a link whose own value counts.
+    The result is the output socket of a node that computes something, or an input socket without a link whose own value
+    counts.
     """
     for _ in range(10_000):  # a tree cannot be deeper; a broken file could hold a loop
         link = next((link for link in socket.links if not link.is_muted and link.is_valid), None)

@@ -18,8 +18,8 @@ _BLEND, _GZIP, _ZSTD = b"BLENDER", b"\x1f\x8b", b"\x28\xb5\x2f\xfd"
 def open_blend(path: str | Path) -> bpy.types.Scene:
     """Replace the current session's data by the file's and return its active scene.
 
-    Text blocks marked to register, scripted drivers and anything else that is Python inside the file stays unexecuted, and
-    the file's window layout is not loaded.
+    Text blocks marked to register, scripted drivers and anything else that is Python inside the file stays unexecuted,
+    and the file's window layout is not loaded.
 
     Raises:
         InputError: the file is missing, is a folder, cannot be read, is not a .blend, or is damaged.
@@ -30,8 +30,10 @@ def open_blend(path: str | Path) -> bpy.types.Scene:
         with quiet_stdout():
             bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=False, use_scripts=False)
     except RuntimeError as error:  # how operators report failure; Blender's own words are on standard error
-        raise InputError(f"{path}: Blender {bpy.app.version_string} cannot open it, so it is damaged, cut short or from a newer "
-                         "Blender; copy it again from its source or open it in the Blender that wrote it") from error
+        raise InputError(
+            f"{path}: Blender {bpy.app.version_string} cannot open it, so it is damaged, cut short or from a newer "
+            "Blender; copy it again from its source or open it in the Blender that wrote it"
+        ) from error
     scene = bpy.context.scene
     if scene is None:
         raise InputError(f"{path}: holds no scene; save it again from Blender with at least one scene")

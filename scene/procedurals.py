@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Procedural textures and other nodes without a counterpart here, answered by a flat render of their output.
 
-A texture that depends on UVs alone becomes an image of the first UV tile. One that depends on the place in space cannot be laid
-on a surface without the surface; its spread of values still goes through the nodes behind it, and their mean colour is what
-the surface gets: the mean of a ramp is not the ramp of a mean.
+A texture that depends on UVs alone becomes an image of the first UV tile. One that depends on the place in space cannot
+be laid on a surface without the surface; its spread of values still goes through the nodes behind it, and their mean
+colour is what the surface gets: the mean of a ramp is not the ramp of a mean.
 """
 
 from __future__ import annotations
@@ -19,10 +19,26 @@ _PLACED_EDGE, _SCATTERED_EDGE = 256, 64
 
 # Their values belong to an object, a light path or a picture, which the flat square is not.
 _OBJECT_BOUND = {
-    "ShaderNodeAttribute", "ShaderNodeVertexColor", "ShaderNodeObjectInfo", "ShaderNodeParticleInfo", "ShaderNodeHairInfo",
-    "ShaderNodePointInfo", "ShaderNodeNewGeometry", "ShaderNodeCameraData", "ShaderNodeTexPointDensity", "ShaderNodeTexIES",
-    "ShaderNodeShaderToRGB", "ShaderNodeScript", "ShaderNodeAmbientOcclusion", "ShaderNodeBevel", "ShaderNodeWireframe",
-    "ShaderNodeTangent", "ShaderNodeNormalMap", "ShaderNodeUVAlongStroke", "ShaderNodeRaycast", "ShaderNodeVolumeInfo",
+    "ShaderNodeAttribute",
+    "ShaderNodeVertexColor",
+    "ShaderNodeObjectInfo",
+    "ShaderNodeParticleInfo",
+    "ShaderNodeHairInfo",
+    "ShaderNodePointInfo",
+    "ShaderNodeNewGeometry",
+    "ShaderNodeCameraData",
+    "ShaderNodeTexPointDensity",
+    "ShaderNodeTexIES",
+    "ShaderNodeShaderToRGB",
+    "ShaderNodeScript",
+    "ShaderNodeAmbientOcclusion",
+    "ShaderNodeBevel",
+    "ShaderNodeWireframe",
+    "ShaderNodeTangent",
+    "ShaderNodeNormalMap",
+    "ShaderNodeUVAlongStroke",
+    "ShaderNodeRaycast",
+    "ShaderNodeVolumeInfo",
     "ShaderNodeTexEnvironment",
 }
 
@@ -72,5 +88,9 @@ def _survey(socket, scope, origins: set, seen: set) -> None:
         source, source_scope = resolve(item, scope)
         if source.is_output:
             _survey(source, source_scope, origins, seen)
-        elif item.name == "Vector" and node.bl_idname.startswith("ShaderNodeTex") and node.bl_idname != "ShaderNodeTexWhiteNoise":
+        elif (
+            item.name == "Vector"
+            and node.bl_idname.startswith("ShaderNodeTex")
+            and node.bl_idname != "ShaderNodeTexWhiteNoise"
+        ):
             origins.add("" if node.bl_idname == "ShaderNodeTexImage" else None)

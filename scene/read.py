@@ -54,8 +54,8 @@ def read_scene(
     Args:
         view_layer: the first one by default.
         frame: evaluate there; the scene is back at its own frame afterwards.
-        live: read what the viewport shows, at its subdivision levels, instead of what a render would. Nothing is evaluated
-            anew, so this is the way to follow edits.
+        live: read what the viewport shows, at its subdivision levels, instead of what a render would. Nothing is
+            evaluated anew, so this is the way to follow edits.
 
     Raises:
         RuntimeError: Blender is rendering and cannot evaluate the scene at render quality now.
@@ -150,8 +150,10 @@ def _add_mesh(harvest: _Harvest, item: bpy.types.Object, matrix: np.ndarray, nam
     if key not in harvest.meshes:
         arrays = harvest.meshes[key] = read_mesh(mesh)
         if arrays.not_finite:
-            notices.append(f"object '{name}': {arrays.not_finite} triangles have corners that are not finite and are left out; "
-                           "clean the mesh up")
+            notices.append(
+                f"object '{name}': {arrays.not_finite} triangles have corners that are not finite and are left out; "
+                "clean the mesh up"
+            )
         if arrays.needles:
             notices.group("triangles without area are left out", f"{name} ({arrays.needles})")
     slots = _slot_materials(item, mesh)
@@ -183,7 +185,9 @@ def _assemble(group: _Instances, slots, materials: MaterialTable, first_object: 
     if not visible.any():
         return None
     if not visible.all():
-        mesh = MeshArrays(mesh.vertices, mesh.triangles[visible], mesh.corner_normals[visible], mesh.slots[visible], {}, "")
+        mesh = MeshArrays(
+            mesh.vertices, mesh.triangles[visible], mesh.corner_normals[visible], mesh.slots[visible], {}, ""
+        )
         used, uvs = used[visible], uvs[visible]
     count = len(group.matrices)
     world: WorldTriangles = place(mesh, uvs, np.array(group.matrices))
@@ -197,7 +201,9 @@ def _assemble(group: _Instances, slots, materials: MaterialTable, first_object: 
     }
 
 
-def _corner_uvs(mesh: MeshArrays, used: np.ndarray, materials: MaterialTable, name: str, notices: Notices) -> np.ndarray:
+def _corner_uvs(
+    mesh: MeshArrays, used: np.ndarray, materials: MaterialTable, name: str, notices: Notices
+) -> np.ndarray:
     """(T, 3, 2) float32 texture coordinates, each triangle's through its own material's mapping."""
     uvs = np.zeros((len(mesh.triangles), 3, 2), np.float32)
     for row in np.unique(used):
@@ -206,7 +212,9 @@ def _corner_uvs(mesh: MeshArrays, used: np.ndarray, materials: MaterialTable, na
         domain = materials.domains[row]
         source = mesh.uv_maps.get(domain.uv_map or mesh.active_uv_map)
         if source is None:
-            notices.group(f"without the UV map of material '{materials.materials[row].name}' a texture shows one colour", name)
+            notices.group(
+                f"without the UV map of material '{materials.materials[row].name}' a texture shows one colour", name
+            )
             continue
         mine = used == row
         uvs[mine] = apply_domain(domain, source[mine])

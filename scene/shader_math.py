@@ -137,7 +137,9 @@ MATH = {
     "POWER": lambda a, b, c: power(a, b),
     "SQRT": lambda a, b, c: np.sqrt(np.maximum(a, 0)),
     "INVERSE_SQRT": lambda a, b, c: divide(np.ones_like(a), np.sqrt(np.maximum(a, 0))),
-    "LOGARITHM": lambda a, b, c: divide(np.log(np.maximum(a, 1e-30)), np.log(np.maximum(b, 1e-30))) * ((a > 0) & (b > 0)),
+    "LOGARITHM": lambda a, b, c: (
+        divide(np.log(np.maximum(a, 1e-30)), np.log(np.maximum(b, 1e-30))) * ((a > 0) & (b > 0))
+    ),
     "ABSOLUTE": lambda a, b, c: np.abs(a),
     "EXPONENT": lambda a, b, c: np.exp(a),
     "MINIMUM": lambda a, b, c: np.minimum(a, b),
@@ -171,6 +173,10 @@ def map_range(value, from_min, from_max, to_min, to_max, interpolation: str, cla
     share = divide(value - from_min, from_max - from_min)
     if interpolation != "LINEAR":
         share = np.clip(share, 0, 1)
-        share = share * share * (3 - 2 * share) if interpolation == "SMOOTHSTEP" else share**3 * (share * (share * 6 - 15) + 10)
+        share = (
+            share * share * (3 - 2 * share)
+            if interpolation == "SMOOTHSTEP"
+            else share**3 * (share * (share * 6 - 15) + 10)
+        )
     result = to_min + share * (to_max - to_min)
     return np.clip(result, np.minimum(to_min, to_max), np.maximum(to_min, to_max)) if clamp else result

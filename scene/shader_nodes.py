@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Evaluates the colour and number nodes of a shader tree per pixel of the textures that feed them.
 
-Nodes that depend on the ray are answered for what a probe bake traces: diffuse rays, averaged over directions with the cosine.
+Nodes that depend on the ray are answered for what a probe bake traces: diffuse rays, averaged over directions with the
+cosine.
 """
 
 from __future__ import annotations
@@ -17,7 +18,13 @@ from .shader_values import SCATTERED, ZERO, Value, apply, as_number, blend, cons
 from .texture_coordinates import domain_of
 
 # Light Path outputs as a diffuse ray after its first bounce sees them.
-DIFFUSE_RAY = {"Is Diffuse Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Length": 1.0, "Ray Depth": 1.0, "Diffuse Depth": 1.0}
+DIFFUSE_RAY = {
+    "Is Diffuse Ray": 1.0,
+    "Is Reflection Ray": 1.0,
+    "Ray Length": 1.0,
+    "Ray Depth": 1.0,
+    "Diffuse Depth": 1.0,
+}
 
 
 class NodeEvaluator:
@@ -26,8 +33,8 @@ class NodeEvaluator:
     Args:
         owner: names the tree in warnings, such as ``material 'Floor'``.
         owner_name: the datablock's name alone, for warnings that list several.
-        sample: answers for outputs that have no counterpart here; called with the evaluator, the socket and its scope, it
-            returns a Value or raises Unsupported. Without it they are not supported.
+        sample: answers for outputs that have no counterpart here; called with the evaluator, the socket and its scope,
+            it returns a Value or raises Unsupported. Without it they are not supported.
     """
 
     def __init__(self, owner: str, images: ImageTable, notices: Notices, owner_name: str, sample=None):
@@ -39,7 +46,8 @@ class NodeEvaluator:
         self._values: dict[tuple, Value] = {}
 
     def input(self, node: bpy.types.Node, name: str, scope: Scope | None) -> Value:
-        """Value of the input called ``name``. Where its source is not supported, the input's own value and a warning."""
+        """Value of the input called ``name``. Where its source is not supported, the input's own value and a warning.
+        """
         socket = find_socket(node.inputs, name)
         if socket is None:
             raise Unsupported(f"it has no input '{name}' in this Blender")
@@ -48,8 +56,10 @@ class NodeEvaluator:
             value = self.output(source, source_scope) if source.is_output else default_value(source)
         except Unsupported as reason:
             if not isinstance(reason, Reported):
-                self.notices.append(f"{self.owner}: node '{source.node.name}' feeding '{socket.name}' of '{node.name}' is not "
-                                    f"supported ({reason}); that input's own value is used")
+                self.notices.append(
+                    f"{self.owner}: node '{source.node.name}' feeding '{socket.name}' of '{node.name}' is not "
+                    f"supported ({reason}); that input's own value is used"
+                )
             value = default_value(socket)
         if socket.type == "VALUE":
             value = _mean_of_channels(value) if source.type == "VECTOR" else as_number(value)
@@ -134,7 +144,11 @@ def _image_texture(evaluator, node, socket, scope):
         return Value(np.ones(1, np.float32), alpha, domain)
     value = Value(np.ones(1, np.float32), color, domain)
     # Cycles keeps the premultiplied colour where nobody asks for the alpha.
-    if node.image.alpha_mode in ("STRAIGHT", "PREMUL") and not find_socket(node.outputs, "Alpha").is_linked and alpha.min() < 1:
+    if (
+        node.image.alpha_mode in ("STRAIGHT", "PREMUL")
+        and not find_socket(node.outputs, "Alpha").is_linked
+        and alpha.min() < 1
+    ):
         value = apply(np.multiply, value, Value(np.ones(1, np.float32), alpha, domain))
     return value
 
@@ -229,7 +243,12 @@ def _float_curve(evaluator, node, socket, scope):
     node.mapping.initialize()
     table = np.array([[node.mapping.evaluate(node.mapping.curves[0], x)] for x in np.linspace(0, 1, 257)], np.float32)
     return evaluator.per_pixel(
-        node, scope, lambda factor, value: value * (1 - factor) + _look_up(table, value[..., 0]) * factor, "Factor", "Value")
+        node,
+        scope,
+        lambda factor, value: value * (1 - factor) + _look_up(table, value[..., 0]) * factor,
+        "Factor",
+        "Value",
+    )
 
 
 def _map_range(evaluator, node, socket, scope):
@@ -255,7 +274,9 @@ def _separate(evaluator, node, socket, scope):
     if mode == "HSL":
         raise Unsupported("HSL")
     split = shader_math.rgb_to_hsv if mode == "HSV" else _rgb
-    return evaluator.per_pixel(node, scope, lambda color: split(color)[..., channel:channel + 1], node.inputs[0].identifier)
+    return evaluator.per_pixel(
+        node, scope, lambda color: split(color)[..., channel : channel + 1], node.inputs[0].identifier
+    )
 
 
 def _combine(evaluator, node, socket, scope):
@@ -318,9 +339,11 @@ _NODES = {
     "ShaderNodeMixRGB": _mix_rgb,
     "ShaderNodeGamma": lambda e, node, socket, scope: e.per_pixel(node, scope, shader_math.gamma, "Color", "Gamma"),
     "ShaderNodeBrightContrast": lambda e, node, socket, scope: e.per_pixel(
-        node, scope, shader_math.bright_contrast, "Color", "Bright", "Contrast"),
+        node, scope, shader_math.bright_contrast, "Color", "Bright", "Contrast"
+    ),
     "ShaderNodeHueSaturation": lambda e, node, socket, scope: e.per_pixel(
-        node, scope, shader_math.hue_saturation, "Hue", "Saturation", "Value", "Fac", "Color"),
+        node, scope, shader_math.hue_saturation, "Hue", "Saturation", "Value", "Fac", "Color"
+    ),
     "ShaderNodeInvert": lambda e, node, socket, scope: e.per_pixel(node, scope, shader_math.invert, "Fac", "Color"),
     "ShaderNodeValToRGB": _color_ramp,
     "ShaderNodeRGBCurve": _rgb_curves,
@@ -335,7 +358,9 @@ _NODES = {
     "ShaderNodeCombineRGB": _combine,
     "ShaderNodeCombineXYZ": _combine,
     "ShaderNodeRGBToBW": lambda e, node, socket, scope: as_number(e.input(node, "Color", scope)),
-    "ShaderNodeBlackbody": lambda e, node, socket, scope: constant(blackbody_color(e.input(node, "Temperature", scope).number())),
+    "ShaderNodeBlackbody": lambda e, node, socket, scope: constant(
+        blackbody_color(e.input(node, "Temperature", scope).number())
+    ),
     "ShaderNodeLightPath": _light_path,
     "ShaderNodeNewGeometry": _geometry,
     "ShaderNodeFresnel": _fresnel,

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a shader socket carries: a constant, or a value per pixel of a texture domain. numpy only.
 
-Node graphs are evaluated once per pixel of the textures that feed them, so any chain of per-pixel nodes (mix, ramp, curves, hue,
-math) ends as one plain texture that a probe bake can sample.
+Node graphs are evaluated once per pixel of the textures that feed them, so any chain of per-pixel nodes (mix, ramp,
+curves, hue, math) ends as one plain texture that a probe bake can sample.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from ..core.conventions import LUMINANCE
 class Domain:
     """Where pixels lie on a surface: texture coordinate = ``matrix`` · (u, v, 1) of the UV map.
 
-    ``uv_map`` "" is the mesh's active one; None means that pixels are samples without a place (a procedural texture's spread of
-    values), of which only the mean reaches the surface.
+    ``uv_map`` "" is the mesh's active one; None means that pixels are samples without a place (a procedural texture's
+    spread of values), of which only the mean reaches the surface.
     """
 
     uv_map: str | None = ""
@@ -85,14 +85,16 @@ def as_number(value: Value) -> Value:
     """Colour to float by luminance, as a float socket does."""
     if value.scale.size == 1 and (value.pixels is None or value.pixels.shape[2] == 1):
         return value
-    return apply(lambda color: np.broadcast_to(color, (*color.shape[:-1], 3)) @ LUMINANCE.astype(np.float32)[:, None], value)
+    return apply(
+        lambda color: np.broadcast_to(color, (*color.shape[:-1], 3)) @ LUMINANCE.astype(np.float32)[:, None], value
+    )
 
 
 def apply(function: Callable[..., np.ndarray], *values: Value) -> Value:
     """``function`` of the arrays of ``values``, per pixel.
 
-    Textures of one domain are combined pixel by pixel at the finest resolution among them. A texture of another domain than
-    the first (finest) one enters with its mean: two unrelated patterns cannot share one image.
+    Textures of one domain are combined pixel by pixel at the finest resolution among them. A texture of another domain
+    than the first (finest) one enters with its mean: two unrelated patterns cannot share one image.
     """
     textured = [value for value in values if not value.is_constant]
     if not textured:

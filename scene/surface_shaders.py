@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Surface shader nodes as one closure: how much they reflect diffusely, let through and emit.
 
-What each closure becomes is chosen so that the light that leaves the surface, summed over all directions, is as close to Cycles
-as a diffuse reflector with holes can be:
+What each closure becomes is chosen so that the light that leaves the surface, summed over all directions, is as close
+to Cycles as a diffuse reflector with holes can be:
 
-- Diffuse, Subsurface, Toon, Sheen, Translucent: their colour reflects diffusely. Glossy nodes too: the energy is right, the
-  direction is spread.
-- Principled: base colour × (1 − metallic) × (1 − transmission); coat, sheen and the few percent of specular are left out. Metal
-  therefore reflects nothing, which is said in a warning.
-- Glass, Refraction and Principled with more than half transmission let light through unbent and uncoloured: a hole. Thin panes
-  are what such materials mostly are, and caustics of solid glass are beyond a light probe.
+- Diffuse, Subsurface, Toon, Sheen, Translucent: their colour reflects diffusely. Glossy nodes too: the energy is right,
+  the direction is spread.
+- Principled: base colour × (1 − metallic) × (1 − transmission); coat, sheen and the few percent of specular are left
+  out. Metal therefore reflects nothing, which is said in a warning.
+- Glass, Refraction and Principled with more than half transmission let light through unbent and uncoloured: a hole.
+  Thin panes are what such materials mostly are, and caustics of solid glass are beyond a light probe.
 - Mix Shader and Add Shader combine these per pixel. Normal inputs are ignored; they turn light, they do not make it.
 """
 
@@ -29,7 +29,9 @@ DEFAULT_GREY = constant([0.8, 0.8, 0.8])
 
 @dataclass(frozen=True)
 class Closure:
-    """``diffuse`` is the albedo of the part that is not hole, ``opacity`` that part, ``emission`` radiance of the whole."""
+    """``diffuse`` is the albedo of the part that is not hole, ``opacity`` that part, ``emission`` radiance of the
+    whole.
+    """
 
     diffuse: Value = constant([0.0, 0.0, 0.0])
     opacity: Value = ONE
@@ -167,7 +169,9 @@ def _add(evaluator, node, scope):
     emission = add(first.emission, second.emission)
     if first.opacity.is_one() and second.opacity.is_one():
         return Closure(add(first.diffuse, second.diffuse), ONE, emission)
-    opacity = apply(lambda a, b: np.clip(a + b - 1, 0, 1), first.opacity, second.opacity)  # what both let through adds up
+    opacity = apply(
+        lambda a, b: np.clip(a + b - 1, 0, 1), first.opacity, second.opacity
+    )  # what both let through adds up
     solid = first if second.opacity.is_zero() else second
     return replace(solid, opacity=opacity, emission=emission)
 

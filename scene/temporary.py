@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rendering aside: work on a throw-away copy of the user's scene and leave ``bpy.data`` as it was.
 
-Reading at render quality, sampling a world and the Cycles reference all need render settings and a camera of their own. They
-get them on a copy that shares the user's objects but not the scene's settings, so nothing has to be restored by hand.
+Reading at render quality, sampling a world and the Cycles reference all need render settings and a camera of their own.
+They get them on a copy that shares the user's objects but not the scene's settings, so nothing has to be restored by
+hand.
 """
 
 from __future__ import annotations
@@ -17,8 +18,20 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-_TRACKED = ("scenes", "objects", "cameras", "worlds", "images", "meshes", "materials", "collections", "node_groups", "lights",
-            "textures", "actions")
+_TRACKED = (
+    "scenes",
+    "objects",
+    "cameras",
+    "worlds",
+    "images",
+    "meshes",
+    "materials",
+    "collections",
+    "node_groups",
+    "lights",
+    "textures",
+    "actions",
+)
 
 
 @contextmanager
@@ -28,7 +41,9 @@ def leave_nothing_behind() -> Iterator[None]:
     try:
         yield
     finally:
-        made = [block for name in _TRACKED for block in getattr(bpy.data, name) if block.session_uid not in before[name]]
+        made = [
+            block for name in _TRACKED for block in getattr(bpy.data, name) if block.session_uid not in before[name]
+        ]
         bpy.data.batch_remove(made)
 
 
@@ -74,7 +89,8 @@ def plain_render_settings(scene: bpy.types.Scene) -> None:
 def render_pixels(scene: bpy.types.Scene, view_layer: str) -> np.ndarray:
     """Render ``scene`` and return its linear (height, width, 3) float32 pixels, row 0 at the bottom.
 
-    Blender keeps a render's pixels from Python, so they travel through an uncompressed 32-bit file in a temporary folder.
+    Blender keeps a render's pixels from Python, so they travel through an uncompressed 32-bit file in a temporary
+    folder.
 
     Raises:
         RuntimeError: Blender could not render; the message is Blender's.

@@ -24,7 +24,8 @@ def affine_coordinates(evaluator, socket, scope, origin_of) -> tuple[str, np.nda
     """(origin, (4, 4) matrix on it) of the vector that arrives at the input ``socket``.
 
     Args:
-        origin_of: called with an output socket, or None for a socket left to its default; names the coordinates that it hands
+        origin_of: called with an output socket, or None for a socket left to its default; names the coordinates that it
+        hands
             out, or returns None where they are not the ones that are asked for.
 
     Raises:
@@ -48,7 +49,11 @@ def _uv_map_of(source) -> str | None:
         return ""
     if source.node.bl_idname == "ShaderNodeUVMap" and not source.node.from_instancer:
         return source.node.uv_map
-    if source.node.bl_idname == "ShaderNodeAttribute" and source.name == "Vector" and source.node.attribute_type == "GEOMETRY":
+    if (
+        source.node.bl_idname == "ShaderNodeAttribute"
+        and source.name == "Vector"
+        and source.node.attribute_type == "GEOMETRY"
+    ):
         return source.node.attribute_name
     return None
 

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A probe volume for a scene that has none: where an artist would have put it.
 
-1. Backdrops are left out: a flat object (a ground plane) more than twice as large as everything smaller together, an object that
-   only emits (a sky dome) more than five times as large, a low one (a terrain) more than ten times as large. Anything else is
-   a room, however little stands in it.
-2. Stragglers are left out: along every axis the volume ends where all but 0.1 % of the surface area lies, unless the rest is
-   near, which means within a quarter of that core.
+1. Backdrops are left out: a flat object (a ground plane) more than twice as large as everything smaller together, an
+   object that only emits (a sky dome) more than five times as large, a low one (a terrain) more than ten times as
+   large. Anything else is a room, however little stands in it.
+2. Stragglers are left out: along every axis the volume ends where all but 0.1 % of the surface area lies, unless the
+   rest is near, which means within a quarter of that core.
 3. Backdrops come back a little: around what stands on them a tenth of the core's diagonal, as far as they reach.
-4. Probes stand in the middle of cells that divide these bounds evenly, plus one layer outside. So no probe lies in a wall that
-   bounds the scene, and every surface has probes on both sides.
+4. Probes stand in the middle of cells that divide these bounds evenly, plus one layer outside. So no probe lies in a
+   wall that bounds the scene, and every surface has probes on both sides.
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ def fit_volume(
     """An axis-aligned grid around what matters in ``snapshot``.
 
     Args:
-        spacing: metres between probes; by default a round figure that gives about a thousand probes, which for a room is
+        spacing: metres between probes; by default a round figure that gives about a thousand probes, which for a room
+        is
             half a metre to a metre.
         resolution: probes per axis instead of a spacing.
 
@@ -71,7 +72,9 @@ def fitted_bounds(snapshot: SceneSnapshot) -> tuple[np.ndarray, np.ndarray, list
         InputError: the scene has no surface.
     """
     if not len(snapshot.triangles):
-        raise InputError(f"scene '{snapshot.name}' has no surface that renders show; add a mesh or give --min and --max")
+        raise InputError(
+            f"scene '{snapshot.name}' has no surface that renders show; add a mesh or give --min and --max"
+        )
     corners = snapshot.triangle_positions
     lows, highs, present = _object_bounds(snapshot, corners)
     kept = _without_backdrops(snapshot, lows, highs, present)
@@ -126,8 +129,13 @@ def _without_backdrops(snapshot, lows, highs, present) -> np.ndarray:
 
 def _only_emitting(snapshot: SceneSnapshot) -> set[int]:
     """Objects whose every material emits and reflects nothing."""
-    emitting = np.array([(any(material.emission) or material.emission_image != NO_IMAGE) and not any(material.base_color)
-                         for material in snapshot.materials], bool)
+    emitting = np.array(
+        [
+            (any(material.emission) or material.emission_image != NO_IMAGE) and not any(material.base_color)
+            for material in snapshot.materials
+        ],
+        bool,
+    )
     reflecting = np.unique(snapshot.object_index[~emitting[snapshot.material_index]])
     return set(np.unique(snapshot.object_index).tolist()) - set(reflecting.tolist())
 

@@ -20,8 +20,8 @@ MARK, RESOLUTION = "gridlight_volume", "gridlight_resolution"
 def find_volumes(scene: bpy.types.Scene) -> list[Volume]:
     """Volumes of ``scene``, by name: box Empties marked by the custom property ``gridlight_volume``.
 
-    The Empty's box is its display size, a cube of half edge ``empty_display_size``, through its world transform. Volumes may be
-    hidden; a bake reads them all the same.
+    The Empty's box is its display size, a cube of half edge ``empty_display_size``, through its world transform.
+    Volumes may be hidden; a bake reads them all the same.
     """
     volumes = []
     for item in sorted(scene.objects, key=lambda item: item.name):

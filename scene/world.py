@@ -22,8 +22,8 @@ from .texture_coordinates import affine_coordinates
 
 RENDERED_WIDTH, RENDERED_HEIGHT, RENDERED_SAMPLES = 256, 128, 64
 
-# A sun disc covers a fraction of a pixel and outshines everything: pixels this much brighter than the mean are rendered again,
-# with enough samples that the disc's share of them is right.
+# A sun disc covers a fraction of a pixel and outshines everything: pixels this much brighter than the mean are rendered
+# again, with enough samples that the disc's share of them is right.
 _SUN_CONTRAST, _SUN_SAMPLES, _SUN_MAX_PIXELS = 20.0, 8192, 256
 
 
@@ -92,7 +92,9 @@ def _environment(evaluator: NodeEvaluator, node: bpy.types.Node, scope) -> np.nd
 
 def _is_direction(source) -> str | None:
     """Generated coordinates of a world are directions; environment textures take them by default."""
-    return "" if source is None or (source.node.bl_idname == "ShaderNodeTexCoord" and source.name == "Generated") else None
+    return (
+        "" if source is None or (source.node.bl_idname == "ShaderNodeTexCoord" and source.name == "Generated") else None
+    )
 
 
 def _sample(panorama: np.ndarray, directions: np.ndarray) -> np.ndarray:

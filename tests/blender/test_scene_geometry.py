@@ -133,7 +133,12 @@ def test_curves_text_surfaces_and_metaballs(scene):
     place(ball, "ball")
     bpy.ops.surface.primitive_nurbs_surface_torus_add()
     snapshot = read_scene(scene)
-    assert {name.split(" > ")[0] for name in snapshot.object_names} == {"text", "curve", "ball", bpy.context.object.name}
+    assert {name.split(" > ")[0] for name in snapshot.object_names} == {
+        "text",
+        "curve",
+        "ball",
+        bpy.context.object.name,
+    }
     assert all((snapshot.object_index == index).any() for index in range(4))
     assert not snapshot.warnings
 
@@ -159,9 +164,12 @@ def test_geometry_nodes_instances_and_materials(scene):
         "NodeGroupOutput"))
     grid.inputs["Vertices X"].default_value = grid.inputs["Vertices Y"].default_value = 3
     paint.inputs["Material"].default_value = material("red", inputs={"Color": (1, 0, 0, 1)})
-    for source, target in ((grid.outputs["Mesh"], scatter.inputs["Points"]), (cube.outputs["Mesh"], paint.inputs["Geometry"]),
-                           (paint.outputs["Geometry"], scatter.inputs["Instance"]),
-                           (scatter.outputs["Instances"], exit_node.inputs[0])):
+    for source, target in (
+        (grid.outputs["Mesh"], scatter.inputs["Points"]),
+        (cube.outputs["Mesh"], paint.inputs["Geometry"]),
+        (paint.outputs["Geometry"], scatter.inputs["Instance"]),
+        (scatter.outputs["Instances"], exit_node.inputs[0]),
+    ):
         tree.links.new(source, target)
     place(quad(), "scattered").modifiers.new("nodes", "NODES").node_group = tree
     snapshot = read_scene(scene)
@@ -268,7 +276,9 @@ def test_frames_leave_the_scene_where_it_was(scene):
 
 def test_reading_leaves_nothing_behind(scene):
     place(quad())
-    before = {name: len(getattr(bpy.data, name)) for name in ("scenes", "objects", "cameras", "images", "meshes", "worlds")}
+    before = {
+        name: len(getattr(bpy.data, name)) for name in ("scenes", "objects", "cameras", "images", "meshes", "worlds")
+    }
     engine = scene.render.engine
     read_scene(scene)
     assert {name: len(getattr(bpy.data, name)) for name in before} == before

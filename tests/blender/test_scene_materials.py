@@ -87,8 +87,13 @@ def test_image_texture_is_shared_between_tints(scene):
     def tinted(color):
         def shader(tree):
             shown = node(tree, "ShaderNodeTexImage", image=picture)
-            mixed = node(tree, "ShaderNodeMix", {"Factor_Float": 1.0, "A_Color": shown.outputs["Color"], "B_Color": color},
-                         data_type="RGBA", blend_type="MULTIPLY")
+            mixed = node(
+                tree,
+                "ShaderNodeMix",
+                {"Factor_Float": 1.0, "A_Color": shown.outputs["Color"], "B_Color": color},
+                data_type="RGBA",
+                blend_type="MULTIPLY",
+            )
             return node(tree, "ShaderNodeBsdfDiffuse", {"Color": mixed.outputs[2]}).outputs[0]
         return built(shader)
 
@@ -112,9 +117,13 @@ def test_leaves_are_clipped_by_their_alpha(scene, way):
         shown = node(tree, "ShaderNodeTexImage", image=image("leaf", HALF), extension="CLIP")
         alpha = shown.outputs["Alpha"]
         if way == "principled":
-            return node(tree, "ShaderNodeBsdfPrincipled", {"Base Color": shown.outputs["Color"], "Alpha": alpha}).outputs[0]
+            return node(
+                tree, "ShaderNodeBsdfPrincipled", {"Base Color": shown.outputs["Color"], "Alpha": alpha}
+            ).outputs[0]
         if way == "threshold":
-            alpha = node(tree, "ShaderNodeMath", {"Value": alpha, "Value_001": 0.3}, operation="GREATER_THAN").outputs[0]
+            alpha = node(tree, "ShaderNodeMath", {"Value": alpha, "Value_001": 0.3}, operation="GREATER_THAN").outputs[
+                0
+            ]
         leaf = node(tree, "ShaderNodeBsdfDiffuse", {"Color": shown.outputs["Color"]})
         hole = node(tree, "ShaderNodeBsdfTransparent")
         return node(tree, "ShaderNodeMixShader", {"Fac": alpha, "Shader": hole.outputs[0],
@@ -161,7 +170,9 @@ def test_mix_and_add_shaders(scene):
         red = node(tree, "ShaderNodeBsdfDiffuse", {"Color": (1, 0, 0, 1)})
         lamp = node(tree, "ShaderNodeEmission", {"Color": (1, 1, 1, 1), "Strength": 2.0})
         blue = node(tree, "ShaderNodeBsdfDiffuse", {"Color": (0, 0, 1, 1)})
-        mixed = node(tree, "ShaderNodeMixShader", {"Fac": 0.25, "Shader": red.outputs[0], "Shader_001": lamp.outputs[0]})
+        mixed = node(
+            tree, "ShaderNodeMixShader", {"Fac": 0.25, "Shader": red.outputs[0], "Shader_001": lamp.outputs[0]}
+        )
         return node(tree, "ShaderNodeAddShader", {"Shader": mixed.outputs[0], "Shader_001": blue.outputs[0]}).outputs[0]
 
     read_material, _ = read(scene, built(shader))
@@ -170,7 +181,9 @@ def test_mix_and_add_shaders(scene):
 
 
 def test_glossy_keeps_its_energy_and_says_so(scene):
-    read_material, snapshot = read(scene, material("Chrome", "ShaderNodeBsdfAnisotropic", {"Color": (0.9, 0.8, 0.7, 1)}))
+    read_material, snapshot = read(
+        scene, material("Chrome", "ShaderNodeBsdfAnisotropic", {"Color": (0.9, 0.8, 0.7, 1)})
+    )
     assert read_material.base_color == pytest.approx((0.9, 0.8, 0.7)) and warned(snapshot, "glossy", "'Chrome'")
 
 

@@ -51,8 +51,13 @@ BLENDS = [item.identifier for item in bpy.types.ShaderNodeMixRGB.bl_rna.properti
 @pytest.mark.parametrize("blend", BLENDS)
 @pytest.mark.parametrize("factor", [0.3, 1.0])
 def test_mix_color(tree, blend, factor):
-    made = node(tree, "ShaderNodeMix", {"Factor_Float": factor, "A_Color": texture(tree), "B_Color": texture(tree, OTHER)},
-                data_type="RGBA", blend_type=blend)
+    made = node(
+        tree,
+        "ShaderNodeMix",
+        {"Factor_Float": factor, "A_Color": texture(tree), "B_Color": texture(tree, OTHER)},
+        data_type="RGBA",
+        blend_type=blend,
+    )
     check(tree, made.outputs["Result_Color"] if "Result_Color" in made.outputs else made.outputs[2], 1e-4)
 
 
@@ -63,19 +68,55 @@ def test_mix_with_constant_and_clamping(tree):
 
 
 def test_old_mix_node_with_a_textured_factor(tree):
-    made = node(tree, "ShaderNodeMixRGB", {"Fac": texture(tree), "Color1": (1, 0, 0, 1), "Color2": texture(tree, OTHER)})
+    made = node(
+        tree, "ShaderNodeMixRGB", {"Fac": texture(tree), "Color1": (1, 0, 0, 1), "Color2": texture(tree, OTHER)}
+    )
     check(tree, made.outputs[0], 1e-4)  # Cycles' luminance weights have more digits
 
 
-MATH = ["ADD", "SUBTRACT", "MULTIPLY", "DIVIDE", "MULTIPLY_ADD", "POWER", "LOGARITHM", "SQRT", "INVERSE_SQRT", "ABSOLUTE",
-        "EXPONENT", "MINIMUM", "MAXIMUM", "LESS_THAN", "GREATER_THAN", "SIGN", "COMPARE", "ROUND", "FLOOR", "CEIL", "TRUNC",
-        "FRACT", "MODULO", "FLOORED_MODULO", "WRAP", "SNAP", "PINGPONG", "SINE", "COSINE", "TANGENT", "ARCTANGENT", "ARCTAN2",
-        "RADIANS", "DEGREES"]
+MATH = [
+    "ADD",
+    "SUBTRACT",
+    "MULTIPLY",
+    "DIVIDE",
+    "MULTIPLY_ADD",
+    "POWER",
+    "LOGARITHM",
+    "SQRT",
+    "INVERSE_SQRT",
+    "ABSOLUTE",
+    "EXPONENT",
+    "MINIMUM",
+    "MAXIMUM",
+    "LESS_THAN",
+    "GREATER_THAN",
+    "SIGN",
+    "COMPARE",
+    "ROUND",
+    "FLOOR",
+    "CEIL",
+    "TRUNC",
+    "FRACT",
+    "MODULO",
+    "FLOORED_MODULO",
+    "WRAP",
+    "SNAP",
+    "PINGPONG",
+    "SINE",
+    "COSINE",
+    "TANGENT",
+    "ARCTANGENT",
+    "ARCTAN2",
+    "RADIANS",
+    "DEGREES",
+]
 
 
 @pytest.mark.parametrize("operation", MATH)
 def test_math(tree, operation):
-    made = node(tree, "ShaderNodeMath", {"Value": texture(tree), "Value_001": 0.37, "Value_002": 0.21}, operation=operation)
+    made = node(
+        tree, "ShaderNodeMath", {"Value": texture(tree), "Value_001": 0.37, "Value_002": 0.21}, operation=operation
+    )
     material = next(item for item in bpy.data.materials if item.node_tree == tree)
     notices = Notices()
     evaluator = NodeEvaluator("m", ImageTable(notices), notices, "m")

@@ -75,11 +75,33 @@ def test_missing_file_and_folder(tmp_path):
     assert "folder" in refused(tmp_path)
 
 
-@pytest.mark.parametrize("content", [
-    b"", b"BLENDER", os.urandom(3000), b"BLENDER" + os.urandom(3000), b"BLENDER-v405" + bytes(3000),
-    b"BLENDER17-01v0502" + os.urandom(3000), b"\x28\xb5\x2f\xfd" + os.urandom(3000), b"\x1f\x8b" + os.urandom(3000),
-    gzip.compress(b"something else"), b"\x89PNG\r\n\x1a\n" + bytes(100),
-], ids=["empty", "magic", "noise", "magic-noise", "magic-zeros", "magic5-noise", "zstd-noise", "gzip-noise", "gzip-other", "png"])
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"BLENDER",
+        os.urandom(3000),
+        b"BLENDER" + os.urandom(3000),
+        b"BLENDER-v405" + bytes(3000),
+        b"BLENDER17-01v0502" + os.urandom(3000),
+        b"\x28\xb5\x2f\xfd" + os.urandom(3000),
+        b"\x1f\x8b" + os.urandom(3000),
+        gzip.compress(b"something else"),
+        b"\x89PNG\r\n\x1a\n" + bytes(100),
+    ],
+    ids=[
+        "empty",
+        "magic",
+        "noise",
+        "magic-noise",
+        "magic-zeros",
+        "magic5-noise",
+        "zstd-noise",
+        "gzip-noise",
+        "gzip-other",
+        "png",
+    ],
+)
 def test_what_is_no_blend_is_refused(tmp_path, content):
     path = tmp_path / "bad.blend"
     path.write_bytes(content)

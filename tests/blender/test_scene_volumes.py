@@ -52,7 +52,9 @@ def test_a_room_is_covered_by_cells_with_a_layer_outside(scene):
     grid = fit_volume(read_scene(scene), spacing=1.0)
     assert grid.resolution == (10, 8, 4)
     positions = grid.positions()
-    assert np.allclose(positions.min(axis=0), [-4.5, -3.5, -0.625]) and np.allclose(positions.max(axis=0), [4.5, 3.5, 3.125])
+    assert np.allclose(positions.min(axis=0), [-4.5, -3.5, -0.625]) and np.allclose(
+        positions.max(axis=0), [4.5, 3.5, 3.125]
+    )
     assert isinstance(grid, Grid)
 
 
