@@ -112,7 +112,7 @@ class _Builder:
         self.put("Bench", furnishing.bench, (8.1, -1.35, 0))
 
     def lamps(self) -> None:
-        """Wall lamps and cove lights: they glow, so their light is in the probes without being a light object."""
+        """Wall lamps, light panels and coves: they glow, so their light is in the probes without being a light object."""
         hall, wing, upper = plan.HALL_Y, plan.WING_Y, plan.LOGGIA_FLOOR
         places = [((-1.4, hall, 2.2), NORTH), ((1.4, hall, 2.2), NORTH), ((0.75, -hall, 2.2), SOUTH), ((3.85, -hall, 2.2), SOUTH)]
         for side in (-1, 1):
@@ -121,6 +121,10 @@ class _Builder:
         places += [((plan.WING_X1, side * 1.65, 2.1), EAST) for side in (-1, 1)]
         for at, turn in places:
             self.put("Wall lamp", furnishing.wall_lamp, at, turn, group="wall")
+        panels = [(6.55, 1, 0), (8.05, 1, 0), (6.75, -1, 0), (9.5, -1, 0)]
+        panels += [(side * x, wall, upper) for side in (-1, 1) for x in (6.6, 9.6) for wall in (-1, 1)]
+        for x, wall, floor in panels:
+            self.put("Light panel", furnishing.light_panel, (x, wall * wing, floor + 1.75), NORTH if wall > 0 else SOUTH, group="wall")
         self.put("Cove lights", plan.cove_lights, group="wall")
 
     def lights(self) -> None:

@@ -48,6 +48,11 @@ def wall_lamp() -> Solid:
     return parts
 
 
+def light_panel() -> Solid:
+    """A tall backlit panel: large and mild, as a grid of probes likes its light sources."""
+    return box((-0.4, -0.05, -0.85), (0.4, 0, 0.85), "Panel glow") + frame(0.8, 1.7, "Walnut", 0.95)
+
+
 def plinth(size: float, height: float, material: str = "Limestone") -> Solid:
     """A square pedestal with base and cap."""
     half = size / 2

@@ -36,8 +36,8 @@ PLAIN = {
 # Emitted radiance, W/(m² sr).
 GLOWING = {
     "Alabaster glow": (2.7, 1.95, 1.15),
-    "Cove glow": (3.6, 3.0, 2.3),
-    "Rail glow": (17.0, 14.0, 10.5),
+    "Cove glow": (3.0, 2.5, 1.9),
+    "Panel glow": (2.3, 2.0, 1.6),
 }
 
 PAINTED = {

@@ -42,7 +42,6 @@ WING_X0, WING_X1, WING_Y = 5.0, 11.2, 2.85  # mirrored for the west wing
 ROOM_TOP, LOGGIA_FLOOR, LOGGIA_TOP = 3.3, 3.6, 7.7
 DOOR_HALF, DOOR_SPRING, DOOR_RISE, DOOR_TOP = 1.3, 2.15, 0.7, 3.0
 ARCH_HALF, ARCH_SPRING, ARCH_RISE, ARCH_TOP = 1.9, 4.75, 0.6, 5.45
-ROOM_RAIL, LOGGIA_RAIL = 2.92, 6.75  # tops of the rails; light strips lie on some
 CORNICE_FOOT, VAULT_SPRING, VAULT_RISE = 5.58, 6.17, 2.43
 STAIR_AT, STAIR_RADIUS = (10.1, 1.8), 0.95
 STAIR_WELL = (9.1, 0.8), (11.1, 2.8)
@@ -95,18 +94,10 @@ def cornice() -> Solid:
 
 
 def cove_lights() -> Solid:
-    """Glowing strips that lie in the hall's cornice and on the rails of the rooms, and wash vault and ceilings."""
-    strips = _strips(-HALL_X + 0.4, HALL_X - 0.4, HALL_Y - 0.25, HALL_Y - 0.05, VAULT_SPRING - 0.14, "Cove glow")
-    for side, heights in ((1, (ROOM_RAIL, LOGGIA_RAIL)), (-1, (LOGGIA_RAIL,))):
-        x0, x1 = sorted((side * (WING_X0 + 0.4), side * (WING_X1 - 0.4)))
-        for z in heights:
-            strips += _strips(x0, x1, WING_Y - 0.12, WING_Y - 0.02, z, "Rail glow")
-    return _joined(strips)
-
-
-def _strips(x0: float, x1: float, near: float, far: float, z: float, material: str) -> list[Solid]:
-    """The same strip along the north and the south wall, ``near`` and ``far`` from the middle axis."""
-    return [box((x0, near, z), (x1, far, z + 0.03), material), box((x0, -far, z), (x1, -near, z + 0.03), material)]
+    """Two glowing strips that lie in the hall's cornice and wash the vault."""
+    x, z = HALL_X - 0.4, VAULT_SPRING - 0.14
+    near, far = HALL_Y - 0.25, HALL_Y - 0.05
+    return box((-x, near, z), (x, far, z + 0.03), "Cove glow") + box((-x, -far, z), (x, -near, z + 0.03), "Cove glow")
 
 
 def trim() -> Solid:
@@ -118,11 +109,9 @@ def trim() -> Solid:
         arch = ((-ARCH_HALF - 0.16, ARCH_HALF + 0.16),)
         west, east = ((), door) if side < 0 else (door, ())
         parts.append(_along_walls(low, high, (0, 0.14), 0.02, "Walnut", west, east))
-        depth = 0.16 if side > 0 else 0.035
-        parts.append(_along_walls(low, high, (ROOM_RAIL - 0.06, ROOM_RAIL), depth, "Walnut", west, east))
+        parts.append(_along_walls(low, high, (2.86, 2.92), 0.035, "Walnut", west, east))
         west, east = ((), arch) if side < 0 else (arch, ())
         parts.append(_along_walls(low, high, (LOGGIA_FLOOR, LOGGIA_FLOOR + 0.14), 0.02, "Walnut", west, east))
-        parts.append(_along_walls(low, high, (LOGGIA_RAIL - 0.08, LOGGIA_RAIL), 0.16, "Ceiling", west, east))
         profile = [(0, LOGGIA_TOP - 0.3), (0.05, LOGGIA_TOP - 0.3), (0.08, LOGGIA_TOP - 0.18), (0.22, LOGGIA_TOP - 0.06),
                    (0.22, LOGGIA_TOP), (0, LOGGIA_TOP)]
         parts.append(ring_moulding(low, high, profile, "Ceiling"))
