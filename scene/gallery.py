@@ -130,8 +130,8 @@ class _Builder:
     def lights(self) -> None:
         self.put("Lay light frame", lambda: furnishing.lay_light(6.2, 1.7, 1.0), (0, 0, 7.6))
         self._area("Hall ceiling light", "ceiling1", (0, 0, 7.59), (6.0, 1.5), 300.0, (1.0, 0.95, 0.88))
-        self.put("Room light frame", lambda: furnishing.lay_light(1.9, 1.1), (-8.1, 0, 3.24))
-        self._area("Room ceiling light", "ceiling2", (-8.1, 0, 3.23), (1.7, 0.9), 52.0, (1.0, 0.90, 0.78))
+        self.put("Room light frame", lambda: furnishing.lay_light(1.9, 1.1), (-8.1, 0, 3.27))
+        self._area("Room ceiling light", "ceiling2", (-8.1, 0, 3.265), (1.7, 0.9), 52.0, (1.0, 0.90, 0.78))
         lamp = bpy.data.lights.new("Wandering lamp", "POINT")
         lamp.energy, lamp.color, lamp.shadow_soft_size = 60.0, (1.0, 0.72, 0.42), 0.09
         thing = bpy.data.objects.new("Wandering lamp", lamp)
@@ -154,9 +154,9 @@ class _Builder:
 
 def _camera(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
     data = bpy.data.cameras.new("Gallery Camera")
-    data.lens, data.clip_start, data.clip_end = 21.0, 0.05, 100.0
+    data.lens, data.clip_start, data.clip_end = 20.0, 0.05, 100.0
     camera = bpy.data.objects.new("Gallery Camera", data)
-    place, target = Vector((-9.9, -1.1, 1.6)), Vector((0.0, 0.42, 2.0))
+    place, target = Vector((-10.6, -1.3, 1.6)), Vector((0.0, 0.5, 1.95))
     camera.location = place
     camera.rotation_euler = (target - place).to_track_quat("-Z", "Y").to_euler()
     collection.objects.link(camera)
