@@ -38,7 +38,8 @@ def render_panoramas(
 ) -> np.ndarray:
     """Radiance seen from ``positions`` (N, 3), world space, metres.
 
-    Panorama ``n`` is rendered with seed ``seed + n``, so the noise of different positions is independent.
+    A rigid body simulation is not part of the copy that is rendered: apply or bake it to keyframes first. Panorama
+    ``n`` is rendered with seed ``seed + n``, so the noise of different positions is independent.
 
     Args:
         bounces: the path length limit for every kind of ray; paths end earlier only by Russian roulette.

@@ -38,9 +38,10 @@ class MaterialTable:
         if key not in self._indices:
             self._indices[key] = len(self.materials)
             if material is None:
-                self._append("", Closure(DEFAULT_GREY), CLIP_THRESHOLD)
+                self._append("", Closure(DEFAULT_GREY), CLIP_THRESHOLD, False)
             else:
-                self._append(material.name, self._closure(material), _threshold(material))
+                culls = bool(material.use_backface_culling)
+                self._append(material.name, self._closure(material), _threshold(material), culls)
         return self._indices[key]
 
     def is_hole(self, index: int) -> bool:
@@ -73,7 +74,7 @@ class MaterialTable:
             self._notices.append(f"material '{material.name}': {reason}; default grey is used")
             return Closure(DEFAULT_GREY)
 
-    def _append(self, name: str, closure: Closure, threshold: float) -> None:
+    def _append(self, name: str, closure: Closure, threshold: float, backface_culling: bool) -> None:
         opacity = _solid_where_opaque(closure.opacity, threshold)
         placed = [value for value in (closure.diffuse, opacity, closure.emission)
                   if not value.is_constant and value.domain.uv_map is not None]
@@ -98,6 +99,7 @@ class MaterialTable:
             emission_image=NO_IMAGE if emission.is_constant else self._add(f"{name} emission", emission, None),
             alpha=opacity.number() if opacity.is_constant else 1.0,
             alpha_threshold=0.0 if opacity.is_constant and opacity.number() >= threshold else threshold,
+            backface_culling=backface_culling,
         ))
 
     def _in_domain(self, name: str, role: str, value: Value, domain: Domain) -> Value:

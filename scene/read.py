@@ -74,7 +74,8 @@ def read_scene(
 
 def _read(scene, view_layer, evaluate) -> SceneSnapshot:
     notices = Notices()
-    harvest = evaluate(scene, view_layer, lambda depsgraph: _harvest(depsgraph, rendered_objects(view_layer), notices))
+    harvest = evaluate(scene, view_layer, lambda depsgraph: _harvest(
+        depsgraph, rendered_objects(view_layer), scene.rigidbody_world is not None, notices))
     images = ImageTable(notices)
     materials = MaterialTable(images, notices)
     override = view_layer.material_override
@@ -103,11 +104,16 @@ def _read(scene, view_layer, evaluate) -> SceneSnapshot:
     )
 
 
-def _harvest(depsgraph: bpy.types.Depsgraph, rendered: set[int], notices: Notices) -> _Harvest:
+def _harvest(
+    depsgraph: bpy.types.Depsgraph, rendered: set[int], rigid_bodies: bool, notices: Notices
+) -> _Harvest:
     """Take meshes, lights and their places out of ``depsgraph``.
 
     Args:
         rendered: ``session_uid`` of the objects that a render shows; a viewport depsgraph holds others too.
+        rigid_bodies: a simulation moves objects. Its state stays with the user's scene when that is copied for reading,
+        so
+            their places are taken from there.
     """
     harvest = _Harvest()
     for instance in depsgraph.object_instances:  # each one dies with its step of the iterator
@@ -119,7 +125,8 @@ def _harvest(depsgraph: bpy.types.Depsgraph, rendered: set[int], notices: Notice
             notices.group(f"{_WITHOUT_SURFACE[item.type]} are not supported and are left out", item.name)
         if item.type not in ("MESH", "LIGHT"):
             continue
-        matrix = np.array(instance.matrix_world, dtype=np.float64)
+        simulated = rigid_bodies and not instance.is_instance and not item.hide_viewport
+        matrix = np.array(item.original.matrix_world if simulated else instance.matrix_world, dtype=np.float64)
         name = f"{instance.parent.name} > {item.name}" if instance.is_instance else item.name
         if not np.isfinite(matrix).all():
             notices.group("objects whose transform is not finite are left out", name)

@@ -274,6 +274,18 @@ def test_frames_leave_the_scene_where_it_was(scene):
     assert snapshot.frame == 10 and scene.frame_current == 1
 
 
+def test_rigid_bodies_are_where_their_simulation_took_them(scene):
+    bpy.ops.mesh.primitive_cube_add()
+    item = bpy.context.object
+    bpy.ops.rigidbody.world_add()
+    bpy.ops.rigidbody.object_add()
+    for frame in range(1, 11):
+        scene.frame_set(frame)
+    fallen = item.matrix_world.translation.z
+    assert fallen < -0.5
+    assert read_scene(scene).vertices[:, 2].mean() == pytest.approx(fallen, abs=1e-5)
+
+
 def test_reading_leaves_nothing_behind(scene):
     place(quad())
     before = {
