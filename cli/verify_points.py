@@ -16,6 +16,7 @@ _RAYS = 128  # that decide whether a point is inside a solid
 _FREE_SHARE = 0.25  # of back faces in sight that a free point may have
 _CLEARANCE = 0.02  # of a cell's shortest edge between a free point and the nearest surface
 _LIFT = 2e-3  # of a cell's shortest edge between a surface point and its surface
+_REACH = 0.5  # cells beyond the box in which surfaces that face it count: a volume seldom touches the walls it lights
 _TRIES = 200  # candidates per point that is asked for
 
 
@@ -48,6 +49,13 @@ class FreeSpace:
             near = [self._tree.find_nearest(point, clearance_m)[0] is not None for point in (points - self._origin).tolist()]
             free &= ~np.array(near, bool)
         return free
+
+    def see_each_other(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """(N,) bool: nothing stands between the points of each pair, (N, 3) and (N, 3)."""
+        offset = second - first
+        distance = np.linalg.norm(offset, axis=1)
+        rays = zip((first - self._origin).tolist(), offset.tolist(), distance.tolist())
+        return np.array([length == 0 or self._tree.ray_cast(start, step, length)[2] is None for start, step, length in rays], bool)
 
     def _sightings(self, points: np.ndarray) -> np.ndarray:
         """(N, _RAYS) int: ±(object + 1) that each ray meets, negative from behind, 0 for the sky."""
@@ -82,7 +90,9 @@ def free_points(space: FreeSpace, grid: Grid, count: int, seed: int) -> np.ndarr
 
 
 def surface_points(space: FreeSpace, grid: Grid, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Random points on the lit side of surfaces inside the box of ``grid``, uniform by area.
+    """Random points on the free side of surfaces in the box of ``grid``, uniform by area.
+
+    Surfaces up to half a cell outside count where the box can see them: walls around a volume, but not their far side.
 
     Returns (points, normals), each (M, 3) with M ≤ count: fewer where little surface has a free side.
     """
@@ -91,6 +101,7 @@ def surface_points(space: FreeSpace, grid: Grid, count: int, seed: int) -> tuple
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(cross, axis=1)
     to_box = np.linalg.inv(grid.matrix)
+    reach = 1 + 2 * _REACH / np.maximum(np.array(grid.resolution) - 1, 1)
     lift = _LIFT * float(grid.cell_size().min())
     points, normals = np.empty((0, 3)), np.empty((0, 3))
     for _ in range(_TRIES):
@@ -98,12 +109,14 @@ def surface_points(space: FreeSpace, grid: Grid, count: int, seed: int) -> tuple
         u, v = random.uniform(size=(2, len(chosen), 1))
         u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
         at = corners[chosen, 0] * (1 - u - v) + corners[chosen, 1] * u + corners[chosen, 2] * v
-        inside = (np.abs(at @ to_box[:3, :3].T + to_box[:3, 3]) <= 1).all(axis=1)
+        local = at @ to_box[:3, :3].T + to_box[:3, 3]
+        near = (np.abs(local) <= reach).all(axis=1)
         normal = cross[chosen] / area[chosen][:, None]
         normal *= random.choice([-1.0, 1.0], (len(chosen), 1))  # both sides of open surfaces are lit
-        at, normal = (at + lift * normal)[inside], normal[inside]
+        at, normal, local = (at + lift * normal)[near], normal[near], local[near]
         if len(at):
-            free = space.is_free(at)
+            in_box = np.clip(local, -1, 1) @ grid.matrix[:3, :3].T + grid.matrix[:3, 3]
+            free = space.is_free(at) & ((np.abs(local) <= 1).all(axis=1) | space.see_each_other(at, in_box))
             points, normals = np.concatenate([points, at[free]]), np.concatenate([normals, normal[free]])
         if len(points) >= count:
             break

@@ -30,6 +30,12 @@ def new_scene(name: str, world=(0.0, 0.0, 0.0)) -> bpy.types.Scene:
     return scene
 
 
+def save(scene, path) -> None:
+    """Write a .blend that opens with ``scene`` as its active one."""
+    bpy.context.window.scene = scene
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+
+
 def diffuse(color, name: str = "Diffuse") -> bpy.types.Material:
     """A Diffuse BSDF."""
     return _material(name, "ShaderNodeBsdfDiffuse", "BSDF", Color=(*color, 1.0), Roughness=0.0)

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``verify`` end to end: its points, its table and its figures, on a room whose light is known."""
+
+import json
+
+import numpy as np
+import pytest
+from gridlight.cli import verify_points
+from gridlight.core.field import Field
+from gridlight.core.grid import Grid
+from gridlight.formats import probe_file
+from gridlight.tests import scenes
+
+EMISSION = 2.0
+
+
+@pytest.fixture(scope="module")
+def furnace(tmp_path_factory):
+    """A closed box of radiance 2 everywhere as a .blend, and a probe file that is exact but for a known factor."""
+    folder = tmp_path_factory.mktemp("furnace")
+    scene = scenes.new_scene("Furnace")
+    scenes.add_box(scene, "Box", (-1, -1, -1), (1, 1, 1), scenes.emitter((1, 1, 1), EMISSION), inward=True)
+    blend = folder / "furnace.blend"
+    scenes.save(scene, blend)
+    return blend, folder
+
+
+def write_field(path, radiance):
+    field = Field.empty(Grid.from_bounds([-0.8] * 3, [0.8] * 3, (2, 2, 2)), 3)
+    field.coefficients[:, 0] = radiance * np.sqrt(4 * np.pi)
+    field.depth[:] = 10.0, 100.0
+    probe_file.write(path, field)
+    return path
+
+
+def test_figures_of_a_field_that_is_two_percent_too_bright(furnace, run_gridlight):
+    blend, folder = furnace
+    probes = write_field(folder / "bright.exr", 1.02 * EMISSION)
+    done = run_gridlight("verify", blend, probes, "--points", 4, "--spp", 1, "--height", 16)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    summary = json.loads(lines[-1])
+    for kind in ("probes", "free points", "surface points"):
+        row = summary["points"][kind]
+        assert row["relative_rms"] == pytest.approx(0.02, rel=1e-2)
+        assert row["bias"] == pytest.approx(0.02, rel=1e-2)
+        assert row["noise"] < 1e-5
+        assert row["points"] == 4
+        assert any(line.startswith(kind) for line in lines[:-1])
+        assert np.abs(row["worst_position"]).max() <= 1
+
+
+def test_a_light_that_is_not_there_is_told(furnace, run_gridlight, tmp_path):
+    scene = scenes.new_scene("Dark")
+    scenes.add_box(scene, "Box", (-1, -1, -1), (1, 1, 1), scenes.diffuse((1, 1, 1)), inward=True)
+    scenes.save(scene, tmp_path / "dark.blend")
+    done = run_gridlight("verify", tmp_path / "dark.blend", write_field(tmp_path / "p.exr", 1.0), "--points", 2, "--spp", 1,
+                         "--height", 8)
+    assert done.returncode == 2
+    assert "no light" in done.stderr
+
+
+@pytest.mark.parametrize("arguments", [("--points", "0"), ("--spp", "0"), ("--height", "1")])
+def test_wrong_options_are_refused_before_blender_starts(furnace, run_gridlight, tmp_path, arguments):
+    blend, _ = furnace
+    done = run_gridlight("verify", blend, write_field(tmp_path / "p.exr", 1.0), *arguments)
+    assert done.returncode == 2
+    assert arguments[0] in done.stderr
+
+
+class TestPoints:
+    """Nothing may be measured inside of solids."""
+
+    @pytest.fixture(scope="class", params=["thick", "cube"])
+    def snapshot(self, request):
+        from gridlight.scene.read import read_scene
+
+        return read_scene(scenes.cornell(request.param))
+
+    def test_free_points_stand_in_the_room_and_outside_its_boxes(self, snapshot):
+        space = verify_points.FreeSpace(snapshot)
+        points = verify_points.free_points(space, Grid.from_bounds([0.05] * 3, [2.75] * 3, (4, 4, 4)), 200, 0)
+        assert points.shape == (200, 3)
+        assert not _in_box(points, (1.05, 1.85), 0.8, 1.55, 0.29).any()
+        assert not _in_box(points, (1.875, 0.875), 0.75, 0.75, -0.31).any()
+
+    def test_the_same_seed_gives_the_same_points(self, snapshot):
+        grid = Grid.from_bounds([0.05] * 3, [2.75] * 3, (4, 4, 4))
+        first, second = (verify_points.free_points(verify_points.FreeSpace(snapshot), grid, 20, 5) for _ in range(2))
+        np.testing.assert_array_equal(first, second)
+
+    def test_surface_points_look_into_the_room(self, snapshot):
+        space = verify_points.FreeSpace(snapshot)
+        grid = Grid.from_bounds([0.1] * 3, [2.7] * 3, (4, 4, 4))
+        space.is_free(grid.positions())  # nodes vote first, as in verify
+        points, normals = verify_points.surface_points(space, grid, 100, 0)
+        assert len(points) == 100
+        np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, rtol=1e-9)
+        # The underside of a box that stands on a cube's face is seen from below too: no ray can tell it from free space.
+        points, normals = points[normals[:, 2] > -0.5], normals[normals[:, 2] > -0.5]
+        ahead = points + 0.02 * normals
+        assert ((ahead > 0) & (ahead < scenes.ROOM_SIZE_M)).all()
+
+
+def _in_box(points, middle, width, height, turn):
+    """(N,) bool: inside of a box on the floor, turned about the vertical."""
+    x, y = (points[:, :2] - middle).T
+    u, v = np.cos(turn) * x + np.sin(turn) * y, -np.sin(turn) * x + np.cos(turn) * y
+    return (np.abs(u) < width / 2) & (np.abs(v) < width / 2) & (points[:, 2] < height)
