@@ -5,8 +5,21 @@ The repository root is the package, whatever its folder is called, so it is load
 without touching ``sys.path``.
 """
 
-import importlib.util
+import os
 import signal
+
+
+def leave_at_once(_number, _frame):
+    """For interrupts before a command has begun: an exception would end as a traceback from the middle of an import."""
+    os.write(2, b"gridlight: cancelled\n")
+    os._exit(130)
+
+
+if __name__ == "__main__":
+    # Set first and explicitly: a shell starts background jobs with it ignored, and `kill -INT` is to work on them too.
+    signal.signal(signal.SIGINT, leave_at_once)
+
+import importlib.util
 import sys
 from pathlib import Path
 
@@ -23,13 +36,7 @@ def load_package():
 
 
 if __name__ == "__main__":
-    # A shell starts background jobs with this one ignored; `kill -INT` is meant to work on them too.
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        load_package()
-        from gridlight.cli.main import main
+    load_package()
+    from gridlight.cli.main import main
 
-        status = main(sys.argv[1:])
-    except KeyboardInterrupt:  # before main could take it
-        status = 130
-    sys.exit(status)
+    sys.exit(main(sys.argv[1:]))

@@ -11,6 +11,7 @@ from ..core.errors import Cancelled, InputError
 from ..core.grid import Grid
 from ..core.settings import CAPTURES, BakeSettings
 from ..core.snapshot import Volume
+from ..formats import probe_file
 from ..formats.staging import StagedFolder
 from . import arguments
 
@@ -73,7 +74,8 @@ def check(args) -> None:
     if args.min is not None:
         if not (args.resolution or args.spacing):
             raise InputError("--min and --max need --resolution NX,NY,NZ or --spacing M")
-        choose_grids(args, None)
+        for grid in choose_grids(args, None):
+            probe_file.check_size(grid, args.bands)
     elif args.resolution:
         Grid(np.eye(4), args.resolution)
     if args.file is not None and not Path(args.file).exists():

@@ -28,7 +28,6 @@ def run(args, reporter, should_stop):
     from ..scene.gallery import build_gallery
     from ..scene.probe_objects import place_probes
     from ..scene.read import read_scene
-    from ..scene.temporary import quiet_stdout
     from . import pipeline
 
     settings = bake.settings_from(args)
@@ -49,6 +48,5 @@ def run(args, reporter, should_stop):
             for volume, result in zip(snapshot.volumes, results):
                 place_probes(scene, result.field.grid, result.field.state, bpy.data.objects.get(volume.name))
             blend = folder.path("gallery.blend").absolute()
-            with quiet_stdout():
-                bpy.ops.wm.save_as_mainfile(filepath=str(blend), copy=True, compress=True)
+            bpy.ops.wm.save_as_mainfile(filepath=str(blend), copy=True, compress=True)
         return pipeline.write_results("Gallery", snapshot, settings, results, folder, reporter, should_stop, stopwatch)

@@ -17,10 +17,7 @@ def add_arguments(parser, in_blender: bool) -> None:
 
 
 def run(args, reporter, should_stop):
-    field = probe_file.read(args.probes)
-    summary = summarise(field)
-    print(_text(args.probes, summary))
-    return summary, 0
+    return summarise(probe_file.read(args.probes)), 0
 
 
 def summarise(field) -> dict:
@@ -42,14 +39,14 @@ def summarise(field) -> dict:
     return summary
 
 
-def _text(path: str, summary: dict) -> str:
+def describe(args, summary: dict) -> str:
     def triple(values):
         return " × ".join(f"{value:.4g}" for value in values)
 
     probes, bounds, light = summary["probes"], summary["bounds"], summary["mean_radiance"]
     major, minor = summary["format_version"]
     lines = [
-        f"{path}: probe file {major}.{minor}, volume '{summary['volume']['name']}'",
+        f"{args.probes}: probe file {major}.{minor}, volume '{summary['volume']['name']}'",
         f"  probes     {triple(summary['resolution'])} = {probes['total']}: {probes['active']} active, {probes['culled']} culled, "
         f"{probes['invalid']} invalid",
         f"  box        {' '.join(f'{v:.4g}' for v in bounds['min'])}  to  {' '.join(f'{v:.4g}' for v in bounds['max'])} m, "

@@ -5,9 +5,13 @@ A command is a module of this folder with
 
 * ``HELP``: one line; ``NEEDS_BLENDER``, ``NEEDS_GPU``: what it runs on;
 * ``add_arguments(parser, in_blender)``;
-* ``run(args, reporter, should_stop) -> (summary, exit status)``: does the work; the summary is printed as JSON.
+* ``run(args, reporter, should_stop) -> (summary, exit status)``: does the work; the summary is printed as JSON. What a command
+  prints itself is lost, because Blender's operators print to the same stream;
 
-and optionally ``check(args)``, quick checks that need no Blender, made before one is started.
+and optionally
+
+* ``describe(args, summary) -> str``: the text for people that stands above the JSON;
+* ``check(args)``: quick checks that need no Blender, made before one is started.
 """
 
 from __future__ import annotations
@@ -16,6 +20,7 @@ import importlib
 import importlib.util
 import json
 import os
+import signal
 import sys
 import traceback
 
@@ -66,7 +71,7 @@ def _guarded(argv: list[str], in_blender: bool, child: bool) -> int:
         return error.exit_status
     except BrokenPipeError:
         # Whoever read our output has enough. Python would complain again when it flushes at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 0
     except SystemExit as end:  # argparse after --help; Blender must not end for it
         return end.code or 0
@@ -89,20 +94,32 @@ def _run(argv: list[str], in_blender: bool, child: bool) -> int:
     if not child and hasattr(module, "check"):
         module.check(args)
     if module.NEEDS_BLENDER and not (in_blender or child):
-        status, process = worker.run_in_child(argv, _say, module.NEEDS_GPU, args.verbose)
-        if status not in (0, 4) and getattr(args, "output", None):
-            staging.remove_leftovers(args.output, process)
-        return status
+        return _run_in_child(argv, args, module)
     stop = Stop()
     if child:
         worker.accept_interrupts(stop.ask)
+    elif not in_blender:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     reporter = Reporter(quiet=getattr(args, "quiet", False))
     try:
         summary, status = module.run(args, reporter, stop)
         reporter.finish()
     finally:
         reporter.abandon()
-    print(json.dumps(summary, allow_nan=False), flush=True)
+    text = f"{module.describe(args, summary)}\n" if hasattr(module, "describe") else ""
+    worker.write_result(f"{text}{json.dumps(summary, allow_nan=False)}\n")
+    return status
+
+
+def _run_in_child(argv: list[str], args, module) -> int:
+    folder = getattr(args, "output", None)
+    try:
+        made = staging.missing_folders(folder) if folder else []
+    except OSError as error:
+        raise InputError(f"cannot write to {folder}: {error.strerror}; name another with -o") from None
+    status, process = worker.run_in_child(argv, _say, module.NEEDS_GPU, args.verbose)
+    if folder and status in (worker.DIED, Cancelled.exit_status):
+        staging.remove_leftovers(folder, process, made)
     return status
 
 

@@ -4,8 +4,8 @@
 The parent never imports bpy. It starts the child with this module's ``prepare_child``, forwards interrupts, and turns a
 death by signal into one plain line. Three descriptors go to the child:
 
-* its standard output and error belong to Python alone: whatever Blender's C code prints goes to the log instead,
-  so the last line of standard output stays the command's JSON;
+* its standard output belongs to the command's result alone and its standard error to our own lines: whatever Blender prints,
+  from C or through ``sys.stdout``, goes to the log instead;
 * ``status``: the child writes the name of every milestone it has passed (see ``milestone``);
 * ``log``: an unnamed file that takes the C-level chatter, shown with --verbose or when the child dies.
 """
@@ -29,7 +29,10 @@ INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
 PATIENCE_SECONDS = 3.0  # a step of the bake on a slow device may take longer
 LOG_TAIL = 4000  # characters of Blender's chatter worth showing after a crash
 
+DIED = 3  # exit status of a command whose child was ended by a signal
+
 _status_descriptor: int | None = None
+_result_stream = None  # of a child; elsewhere results go to sys.stdout
 
 
 def is_child() -> bool:
@@ -44,14 +47,14 @@ def milestone(name: str) -> None:
 
 def prepare_child() -> None:
     """Sets up this process as the child: descriptors, interrupts, and its end when the parent ends."""
-    global _status_descriptor
+    global _status_descriptor, _result_stream
     _status_descriptor, log, parent_alive = map(int, os.environ.pop(DESCRIPTORS).split(","))
     sys.stdout.flush()
     sys.stderr.flush()
     output, errors = os.dup(1), os.dup(2)
     os.dup2(log, 1)
     os.dup2(log, 2)
-    sys.stdout = open(output, "w", encoding="utf-8", errors="backslashreplace")
+    _result_stream = open(output, "w", encoding="utf-8", errors="backslashreplace")
     sys.stderr = open(errors, "w", encoding="utf-8", errors="backslashreplace", buffering=1)
     faulthandler.enable(log)
     threading.Thread(target=_end_with_parent, args=(parent_alive,), daemon=True).start()
@@ -61,6 +64,13 @@ def _end_with_parent(parent_alive: int) -> None:
     # The parent holds the other end of this pipe and never writes: reading returns when the parent is gone.
     os.read(parent_alive, 1)
     os.kill(os.getpid(), signal.SIGTERM)
+
+
+def write_result(text: str) -> None:
+    """Writes ``text`` to the standard output that the user sees."""
+    stream = _result_stream or sys.stdout
+    stream.write(text)
+    stream.flush()
 
 
 def accept_interrupts(handler) -> None:
@@ -118,7 +128,7 @@ def run_in_child(argv: list[str], say, needs_gpu: bool, verbose: bool) -> tuple[
     if chatter and not verbose and not before_context:
         print(chatter[-LOG_TAIL:], file=sys.stderr)
     say(_death_line(-code, before_context))
-    return 3, child.pid
+    return DIED, child.pid
 
 
 def _forward_interrupts(child) -> list[int]:

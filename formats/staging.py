@@ -27,8 +27,7 @@ class StagedFolder:
 
     def __enter__(self):
         try:
-            missing = [folder for folder in (self.folder, *self.folder.parents) if not folder.exists()]
-            for folder in reversed(missing):
+            for folder in reversed(missing_folders(self.folder)):
                 folder.mkdir()
                 self._made.insert(0, folder)
             probe = self._temporary("probe")
@@ -73,17 +72,25 @@ class StagedFolder:
     def _discard(self):
         for temporary in self._staged.values():
             temporary.unlink(missing_ok=True)
-        for folder in self._made:
-            try:
-                folder.rmdir()
-            except OSError:
-                break  # something else has been put there in the meantime: it stays
+        _remove_empty(self._made)
 
 
-def remove_leftovers(output, process: int) -> None:
-    """Removes the temporary files that process number ``process`` left when it was killed."""
-    output = Path(output)
-    for folder in (output, output.parent):
-        if folder.is_dir():
-            for leftover in folder.glob(f".*.{process}.part*"):
-                leftover.unlink(missing_ok=True)
+def missing_folders(folder) -> list[Path]:
+    """``folder`` and those above it that do not exist, innermost first. Raises OSError for names that cannot be."""
+    folder = Path(folder)
+    return [path for path in (folder, *folder.parents) if not path.exists()]
+
+
+def remove_leftovers(folder, process: int, made: list[Path]) -> None:
+    """Removes from ``folder`` what process number ``process`` left there when it was killed, and the folders it ``made``."""
+    for leftover in Path(folder).glob(f".*.{process}.part*"):
+        leftover.unlink(missing_ok=True)
+    _remove_empty(made)
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    for folder in folders:
+        try:
+            folder.rmdir()
+        except OSError:
+            break  # not made after all, or something else has been put there in the meantime: it stays

@@ -3,8 +3,10 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -251,3 +253,19 @@ def test_a_reader_that_leaves_gets_no_traceback(constant_file, root):
                           stdout=write_end, stderr=subprocess.PIPE, text=True, check=False, timeout=60)
     os.close(write_end)
     assert done.returncode == 0 and done.stderr == ""
+
+
+# --- interrupts --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("delay", [0.15, 0.2, 0.3, 0.5, 0.8])
+def test_an_interrupt_at_any_time_ends_eval_without_traceback(constant_file, tmp_path, root, delay):
+    points, out = tmp_path / "p.csv", tmp_path / "out"
+    points.write_text("x,y,z,nx,ny,nz\n" + "0,0,0,0,0,1\n" * 400_000)
+    process = subprocess.Popen([sys.executable, "-I", root / "cli" / "__main__.py", "eval", constant_file, "--points", points,
+                                "-o", out / "e.csv"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(delay)
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=60)
+    assert process.returncode == 130 and errors.splitlines()[-1] == "gridlight: cancelled"
+    assert "Traceback" not in errors and not output and not out.exists()

@@ -54,5 +54,5 @@ def test_leftovers_of_a_killed_process_are_found(tmp_path):
     folder = StagedFolder(tmp_path)
     folder.path("probes.exr").write_text("half")
     (tmp_path / "mine.part.exr").write_text("keep")
-    remove_leftovers(tmp_path, os.getpid())
+    remove_leftovers(tmp_path, os.getpid(), [])
     assert [path.name for path in tmp_path.iterdir()] == ["mine.part.exr"]
