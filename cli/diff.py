@@ -20,7 +20,9 @@ def add_arguments(parser, in_blender: bool) -> None:
 
 def run(args, reporter, should_stop):
     first, second = probe_file.read(args.first), probe_file.read(args.second)
-    return compare(first, second), 0
+    summary = compare(first, second)
+    reporter.result(_text(args, summary))
+    return summary, 0
 
 
 def compare(first, second) -> dict:
@@ -73,7 +75,7 @@ def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
-def describe(args, summary: dict) -> str:
+def _text(args, summary: dict) -> str:
     def share(value):
         return "" if value is None else f"  ({100 * value:.4g} %)"
 

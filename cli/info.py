@@ -17,7 +17,9 @@ def add_arguments(parser, in_blender: bool) -> None:
 
 
 def run(args, reporter, should_stop):
-    return summarise(probe_file.read(args.probes)), 0
+    summary = summarise(probe_file.read(args.probes))
+    reporter.result(_text(args.probes, summary))
+    return summary, 0
 
 
 def summarise(field) -> dict:
@@ -39,14 +41,14 @@ def summarise(field) -> dict:
     return summary
 
 
-def describe(args, summary: dict) -> str:
+def _text(path: str, summary: dict) -> str:
     def triple(values):
         return " × ".join(f"{value:.4g}" for value in values)
 
     probes, bounds, light = summary["probes"], summary["bounds"], summary["mean_radiance"]
     major, minor = summary["format_version"]
     lines = [
-        f"{args.probes}: probe file {major}.{minor}, volume '{summary['volume']['name']}'",
+        f"{path}: probe file {major}.{minor}, volume '{summary['volume']['name']}'",
         f"  probes     {triple(summary['resolution'])} = {probes['total']}: {probes['active']} active, {probes['culled']} culled, "
         f"{probes['invalid']} invalid",
         f"  box        {' '.join(f'{v:.4g}' for v in bounds['min'])}  to  {' '.join(f'{v:.4g}' for v in bounds['max'])} m, "

@@ -5,13 +5,10 @@ A command is a module of this folder with
 
 * ``HELP``: one line; ``NEEDS_BLENDER``, ``NEEDS_GPU``: what it runs on;
 * ``add_arguments(parser, in_blender)``;
-* ``run(args, reporter, should_stop) -> (summary, exit status)``: does the work; the summary is printed as JSON. What a command
-  prints itself is lost, because Blender's operators print to the same stream;
+* ``run(args, reporter, should_stop) -> (summary, exit status)``: does the work; the summary is printed as JSON, below what
+  ``reporter.result`` was given. What a command prints itself is lost: Blender's operators print to the same stream;
 
-and optionally
-
-* ``describe(args, summary) -> str``: the text for people that stands above the JSON;
-* ``check(args)``: quick checks that need no Blender, made before one is started.
+and optionally ``check(args)``, quick checks that need no Blender, made before one is started.
 """
 
 from __future__ import annotations
@@ -106,8 +103,7 @@ def _run(argv: list[str], in_blender: bool, child: bool) -> int:
         reporter.finish()
     finally:
         reporter.abandon()
-    text = f"{module.describe(args, summary)}\n" if hasattr(module, "describe") else ""
-    worker.write_result(f"{text}{json.dumps(summary, allow_nan=False)}\n")
+    worker.write_result("\n".join([*reporter.results, json.dumps(summary, allow_nan=False), ""]))
     return status
 
 

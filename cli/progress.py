@@ -16,11 +16,12 @@ class Reporter:
 
     A job calls ``phase`` when a new kind of work starts, ``advance`` as it goes, ``note`` for facts worth reading and
     ``warn`` for what the user should act on. ``quiet`` silences all but warnings. Every warning is kept, once, in
-    ``warnings``.
+    ``warnings``. ``result`` takes text for people that belongs on standard output, above the JSON; it is kept in ``results``.
     """
 
     def __init__(self, stream=None, quiet: bool = False, clock=time.monotonic):
         self.warnings: list[str] = []
+        self.results: list[str] = []
         self._stream = sys.stderr if stream is None else stream
         self._quiet = quiet
         self._clock = clock
@@ -55,6 +56,9 @@ class Reporter:
         if text not in self.warnings:
             self.warnings.append(text)
             self._line(f"warning: {text}")
+
+    def result(self, text: str) -> None:
+        self.results.append(text)
 
     def finish(self) -> None:
         """Ends the running phase with its last figures."""

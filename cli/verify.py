@@ -95,7 +95,7 @@ def run(args, reporter, should_stop):
                       "another Blender reads it differently")
     kinds = choose_points(field, snapshot, args.points, args.seed)
     rows = measure(scene, field, kinds, args.spp, args.height, frame, reporter, should_stop)
-    print(table(rows, field, args.spp, args.height), flush=True)
+    reporter.result(table(rows, field, args.spp, args.height))
     summary = {
         "points": {row.points.name: row.as_dict() for row in rows},
         "bands": field.bands,
