@@ -67,11 +67,11 @@ LIGHTS = {
 }
 
 
-def wall_and_screen(name):
+def wall_and_screen(name, half_edge=WALL):
     """A wall at y = 1.6 that fills the view and, behind the probe, a screen without thickness that faces the lights."""
     scene = scenes.new_scene(name)
     white = scenes.diffuse((0.8, 0.8, 0.8))
-    scenes.add_plane(scene, "Wall", (0, 1.6, 0), (WALL, 0, 0), (0, 0, WALL), white)
+    scenes.add_plane(scene, "Wall", (0, 1.6, 0), (half_edge, 0, 0), (0, 0, half_edge), white)
     scenes.add_plane(scene, "Screen", (0.2, -0.3, 0.4), (0.2, 0, 0), (0, 0, 0.15), white)
     return scene
 
@@ -99,10 +99,20 @@ def check(scene, samples=16):
     assert error < TOLERANCE
 
 
-@pytest.mark.parametrize("name", LIGHTS)
+SCALED_CONE = pytest.mark.xfail(strict=True, reason="Cycles stretches the cone with the object, see docs/measurements.md")
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=SCALED_CONE if name == "spot, scaled" else ()) for name in LIGHTS])
 def test_light_on_a_wall(gpu_context, name):
     scene = wall_and_screen(name)
     scenes.add_light(scene, **LIGHTS[name])
+    check(scene)
+
+
+@pytest.mark.xfail(strict=True, reason="shadow rays that start on a triangle kilometres wide hit it again")
+def test_light_on_a_wall_two_kilometres_wide(gpu_context):
+    scene = wall_and_screen("Huge", half_edge=1000.0)
+    scenes.add_light(scene, "POINT", BEHIND, energy=50, shadow_soft_size=0.3)
     check(scene)
 
 
