@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scenes of a few triangles as plain snapshots: furnaces, and a cluttered room with everything a bake must handle."""
+
+from dataclasses import replace
+
+import numpy as np
+from gridlight.bake.job import run_bake
+from gridlight.core import lookup
+from gridlight.core.direct_light import tangent_frame
+from gridlight.core.snapshot import Image, Light, Material, SceneSnapshot, World
+
+AXES = np.concatenate([np.eye(3), -np.eye(3)])
+
+
+class Silent:
+    """A reporter that says nothing."""
+
+    def phase(self, name, total=None):
+        pass
+
+    def advance(self, amount=1):
+        pass
+
+    note = warn = advance
+
+
+def bake(snapshot, grid, settings):
+    return run_bake(snapshot, grid, settings, Silent(), lambda: False)
+
+
+def irradiance_at_nodes(field, normals=AXES):
+    """(P, N, 3) irradiance over π at every node for every normal."""
+    points = np.repeat(field.grid.positions(), len(normals), axis=0)
+    found = lookup.irradiance(field, points, np.tile(normals, (field.grid.count, 1))) / np.pi
+    return found.reshape(field.grid.count, len(normals), 3)
+
+
+def snapshot_of(corners, material=None, materials=(), objects=None, uvs=None, **options):
+    """A snapshot of loose triangles ``corners`` (T, 3, 3) with flat normals."""
+    corners = np.asarray(corners, float)
+    count = len(corners)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    objects = np.zeros(count, np.int32) if objects is None else np.asarray(objects, np.int32)
+    return SceneSnapshot(
+        vertices=corners.reshape(-1, 3), triangles=np.arange(3 * count, dtype=np.int32).reshape(-1, 3),
+        corner_normals=np.repeat(normal[:, None], 3, axis=1).astype(np.float32),
+        corner_uvs=np.zeros((count, 3, 2), np.float32) if uvs is None else np.asarray(uvs, np.float32),
+        material_index=np.zeros(count, np.int32) if material is None else np.asarray(material, np.int32),
+        object_index=objects, object_names=[f"object {i}" for i in range(int(objects.max(initial=0)) + 1)],
+        materials=list(materials) or [Material("grey")], images=options.pop("images", []), lights=options.pop("lights", []),
+        world=options.pop("world", World()), **options)
+
+
+def box(low=(-1, -1, -1), high=(1, 1, 1)):
+    """(12, 3, 3) triangles whose normals point outwards."""
+    x, y, z = np.stack([low, high], axis=1).astype(float)
+    corners = np.array([[a, b, c] for c in z for b in y for a in x])
+    quads = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
+    return corners[np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])]
+
+
+def furnace(albedo, emission=1.0, inward=False):
+    """A closed cube, 2 m: radiance emission / (1 − albedo) everywhere."""
+    corners = box()[:, ::-1] if inward else box()
+    return snapshot_of(corners, materials=[Material("glowing", (albedo,) * 3, emission=(emission,) * 3)])
+
+
+def frame(position=(0, 0, 0), towards=(0, 0, -1)):
+    """(4, 4) matrix of a light at ``position`` that shines ``towards``."""
+    back = -np.asarray(towards, float) / np.linalg.norm(towards)
+    right, up = tangent_frame(back[None])
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.stack([right[0], up[0], back], axis=1)
+    matrix[:3, 3] = position
+    return matrix
+
+
+def all_lights():
+    """One light of every kind and every variant of its formula."""
+    color = (3.0, 2.0, 1.0)
+    return {
+        "point": Light("point", "POINT", color, frame((0.3, 0.5, 0.7))),
+        "point soft": Light("point soft", "POINT", color, frame((0.3, 0.45, 0.7)), radius=0.15),
+        "point sphere": Light("point sphere", "POINT", color, frame((-0.5, 0.4, 0.66)), radius=0.15, soft_falloff=False),
+        "spot": Light("spot", "SPOT", color, frame((0.5, 0.4, 0.8), (-0.3, -0.2, -1)), spot_size=1.2, spot_blend=0.4),
+        "spot soft": Light("spot soft", "SPOT", color, frame((0.5, -0.4, 0.8), (-0.3, 0.2, -1)), spot_size=1.0, spot_blend=0.2, radius=0.1),
+        "sun": Light("sun", "SUN", color, frame(towards=(0.3, 0.4, -0.8))),
+        "sun wide": Light("sun wide", "SUN", color, frame(towards=(-0.3, 0.4, -0.8)), angle=0.3),
+        "rectangle": Light("rectangle", "AREA", color, frame((0.1, 0.2, 0.9), (0.1, 0, -1)), size_x=0.5, size_y=0.3),
+        "ellipse": Light("ellipse", "AREA", color, frame((-0.1, -0.3, 0.9), (0, 0.2, -1)), shape="ELLIPSE", size_x=0.4, size_y=0.7),
+        "spread": Light("spread", "AREA", color, frame((-0.1, 0.3, 0.9), (0, 0.2, -1)), size_x=0.3, size_y=0.3, spread=1.5),
+        "shadowless": Light("shadowless", "POINT", color, frame((-0.3, 0.5, -0.6)), casts_shadow=False),
+    }
+
+
+def cluttered_room(lights=None, seed=0, clutter=24):
+    """A room with one side open to the sky, pieces of it textured, one wall glowing, and triangles flying about, some with holes."""
+    generator = np.random.default_rng(seed)
+    walls = box((-1.6, -1.3, -1.1), (1.5, 1.4, 1.2))[:, ::-1]
+    walls = np.delete(walls, (1, 7), axis=0)  # the ceiling is the sky
+    pieces = generator.uniform(-1, 1, (clutter, 1, 3)) + generator.normal(0, 0.3, (clutter, 3, 3))
+    corners = np.concatenate([walls, pieces])
+    corners += generator.normal(0, 0.01, 3)  # nothing lines up with anything
+    material = np.concatenate([[0, 1, 2, 0, 3] * 2, generator.integers(0, 6, clutter)])
+    pixels = generator.random((16, 32, 4)).astype(np.float32)
+    holes = np.ones((8, 8, 4), np.float32)
+    holes[..., 3] = generator.random((8, 8)) < 0.5
+    materials = [
+        Material("plain", (0.7, 0.6, 0.5)),
+        Material("textured", (0.9, 0.9, 0.9), base_image=0),
+        Material("glowing", (0.3, 0.3, 0.3), emission=(0.5, 0.8, 1.0)),
+        Material("glowing picture", (0.5, 0.5, 0.5), diffuse_share=0.5, emission=(1.0, 0.5, 0.2), emission_image=0),
+        Material("leaf", (0.2, 0.8, 0.3), alpha_image=1, alpha_threshold=0.5),
+        Material("net", (0.6, 0.1, 0.1), base_image=0, alpha_image=0, alpha_from_color=True, alpha_threshold=0.4),
+    ]
+    images = [Image("noise", pixels, "REPEAT"), Image("holes", holes, "EXTEND")]
+    sky = generator.random((16, 32, 3)).astype(np.float32)
+    uvs = generator.uniform(-1, 2, (len(corners), 3, 2))
+    # What glows belongs to the walls: as a large object it is light that the field carries, not lamps that are sampled.
+    objects = np.where(np.isin(material, (2, 3)), 0, np.concatenate([np.zeros(10, int), 1 + np.arange(clutter) % 4]))
+    return snapshot_of(corners, material, materials, objects, uvs, images=images, world=World(map=sky),
+                       lights=list((all_lights() if lights is None else lights).values()))
+
+
+def moved(snapshot, matrix):
+    """``snapshot`` under ``matrix`` (4, 4), a rotation, translation and uniform scale; light of lamps is not rescaled."""
+    scale = np.cbrt(np.linalg.det(matrix[:3, :3]))
+    rotation = matrix[:3, :3] / scale
+    lights = []
+    for light in snapshot.lights:
+        placed = np.eye(4)
+        placed[:3, :3] = rotation @ light.matrix[:3, :3]
+        placed[:3, 3] = matrix[:3, :3] @ light.matrix[:3, 3] + matrix[:3, 3]
+        lights.append(replace(light, matrix=placed))
+    return replace(
+        snapshot, vertices=snapshot.vertices @ matrix[:3, :3].T + matrix[:3, 3],
+        corner_normals=(snapshot.corner_normals @ rotation.T).astype(np.float32), lights=lights)
