@@ -63,6 +63,20 @@ vec4 enter_boxes(Ray ray, int node, float limit)
   return mix(vec4(NO_HIT), entry, lessThanEqual(entry, leave));
 }
 
+/* How far off the distance of a hit may be by rounding, from the corners a, b, c in the ray's frame: closer hits cannot be told from the
+ * ray's own start. Matters where triangles are large: a ground plane of a kilometre would shadow itself.
+ * Pharr, Jakob and Humphreys, "Physically Based Rendering", 3rd edition, section 3.9.6. */
+float distance_error(Ray ray, vec3 a, vec3 b, vec3 c, vec2 pa, vec2 pb, vec2 pc, vec3 edges, float determinant)
+{
+  const float ulp = 5.96e-8;
+  float most_z = max(abs(a.z), max(abs(b.z), abs(c.z))) * abs(ray.shear.z);
+  vec2 most = max(abs(pa), max(abs(pb), abs(pc)));
+  vec2 error = (5.0 * ulp) * (most + most_z);
+  float error_edge = 2.0 * (2.0 * ulp * most.x * most.y + error.y * most.x + error.x * most.y);
+  float most_edge = max(abs(edges.x), max(abs(edges.y), abs(edges.z)));
+  return 3.0 * most_z * (6.0 * ulp * most_edge + error_edge) / abs(determinant);
+}
+
 /* Tests triangle `index`; on a hit nearer than hit.distance replaces it. Returns true where its leaf ends. */
 bool intersect_triangle(Ray ray, int index, inout Hit hit)
 {
@@ -82,7 +96,8 @@ bool intersect_triangle(Ray ray, int index, inout Hit hit)
   float determinant = u + v + w;
   if (!miss && determinant != 0.0) {
     float distance = (u * a.z + v * b.z + w * c.z) * ray.shear.z / determinant;
-    if (distance > 0.0 && distance < hit.distance) {
+    if (distance > 0.0 && distance < hit.distance &&
+        distance > distance_error(ray, a, b, c, pa, pb, pc, vec3(u, v, w), determinant)) {
       vec2 barycentric = vec2(v, w) / determinant;
 #ifdef HAS_ALPHA
       if (corner1.w != 0.0 && is_hole(index, barycentric)) {

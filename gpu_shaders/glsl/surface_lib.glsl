@@ -90,6 +90,20 @@ struct Surface {
   float emitter_density; /* per m²; 0 where the emission is carried by the field */
 };
 
+/* Where a ray meets a triangle's plane, near the `interpolated` hit. Interpolation is off by the rounding of the corners, centimetres on a
+ * ground plane of kilometres; the plane is as exact as its nearest corner, and exact where it is parallel to two axes. */
+vec3 meet_plane(vec3 a, vec3 b, vec3 c, vec3 geometric, vec3 interpolated, vec3 origin, vec3 direction)
+{
+  vec3 to_a = a - origin, to_b = b - origin, to_c = c - origin;
+  vec3 nearest = dot(to_b, to_b) < dot(to_a, to_a) ? to_b : to_a;
+  nearest = dot(to_c, to_c) < dot(nearest, nearest) ? to_c : nearest;
+  float slope = dot(geometric, direction);
+  float guess = dot(interpolated - origin, direction);
+  float distance = slope != 0.0 ? dot(geometric, nearest) / slope : guess;
+  /* a sliver's normal is mostly rounding */
+  return abs(distance - guess) < 0.01 * guess ? origin + direction * distance : interpolated;
+}
+
 /* Surface at `barycentric` of `triangle` seen along `direction`; `spread` is the angular width of the view, radians. */
 Surface resolve_surface(int triangle, vec2 barycentric, vec3 origin, vec3 direction, float spread)
 {
@@ -97,8 +111,8 @@ Surface resolve_surface(int triangle, vec2 barycentric, vec3 origin, vec3 direct
   vec3 a = element(triangle_corners, 3 * triangle).xyz;
   vec3 b = element(triangle_corners, 3 * triangle + 1).xyz;
   vec3 c = element(triangle_corners, 3 * triangle + 2).xyz;
-  surface.position = interpolate(a, b, c, barycentric);
   vec3 geometric = cross(b - a, c - a);
+  surface.position = meet_plane(a, b, c, geometric, interpolate(a, b, c, barycentric), origin, direction);
   surface.back = dot(geometric, direction) > 0.0;
   vec4 n0 = element(triangle_attributes, 5 * triangle);
   vec4 n1 = element(triangle_attributes, 5 * triangle + 1);

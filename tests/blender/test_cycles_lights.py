@@ -109,7 +109,6 @@ def test_light_on_a_wall(gpu_context, name):
     check(scene)
 
 
-@pytest.mark.xfail(strict=True, reason="shadow rays that start on a triangle kilometres wide hit it again")
 def test_light_on_a_wall_two_kilometres_wide(gpu_context):
     scene = wall_and_screen("Huge", half_edge=1000.0)
     scenes.add_light(scene, "POINT", BEHIND, energy=50, shadow_soft_size=0.3)
