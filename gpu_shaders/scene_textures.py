@@ -196,7 +196,8 @@ def _pack_images(images: list[Image]) -> tuple[np.ndarray, np.ndarray]:
         rows = -(-len(texels) // ROW)
         parts.append(np.pad(texels, ((0, rows * ROW - len(texels)), (0, 0))))
         row += rows
-    return table, np.minimum(np.concatenate(parts), 65504.0)
+    # Rounded here: Blender 4.5 cuts off what does not fit a half float, which darkens every image.
+    return table, np.minimum(np.concatenate(parts), 65504.0).astype(np.float16).astype(np.float32)
 
 
 def _halve(level: np.ndarray) -> np.ndarray:
