@@ -16,11 +16,17 @@ vec3 face_direction(int face, vec2 st)
   }
 }
 
-vec3 texel_direction(ivec2 texel)
+/* Direction through `place` (0..1) of a texel. */
+vec3 texel_place_direction(ivec2 texel, vec2 place)
 {
   int face = texel.y / FACE;
-  vec2 st = (vec2(texel.x, texel.y - face * FACE) + 0.5) * (2.0 / float(FACE)) - 1.0;
+  vec2 st = (vec2(texel.x, texel.y - face * FACE) + place) * (2.0 / float(FACE)) - 1.0;
   return normalize(face_direction(face, st));
+}
+
+vec3 texel_direction(ivec2 texel)
+{
+  return texel_place_direction(texel, vec2(0.5));
 }
 
 ivec2 direction_texel(vec3 direction)
@@ -42,11 +48,6 @@ ivec2 direction_texel(vec3 direction)
   }
   ivec2 texel = clamp(ivec2((st * 0.5 + 0.5) * float(FACE)), ivec2(0), ivec2(FACE - 1));
   return ivec2(texel.x, face * FACE + texel.y);
-}
-
-float corner_integral(vec2 st)
-{
-  return atan(st.x * st.y, sqrt(dot(st, st) + 1.0));
 }
 
 vec3 octahedral_decode(vec2 uv)

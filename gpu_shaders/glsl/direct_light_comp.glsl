@@ -1,9 +1,17 @@
-/* What a texel sends to its probe before any bounce: reflected direct light, and
- * emission as far as the field carries it.
+/* What a texel sends to its probe before any bounce: reflected direct light, and emission as far as the field carries it.
  *
+ * Each of `samples` looks at another place of the texel's footprint, found on the plane of its surface without another ray, and at another
+ * place of each light: shadow edges and bright spots are averaged over the texel instead of missed or hit by its centre.
  * Dispatch: x = columns, y = 6·FACE rows, z = probes; groups of 8×8×1. Reads layer first_layer + probe of geometry, albedo and emission,
  * writes `source`.
  */
+
+/* Distance along `direction` of the plane through the texel's surface; the centre's where the plane is seen edge-on. */
+float plane_distance(vec3 centre_direction, float distance, vec3 normal, vec3 direction)
+{
+  float range = distance * dot(centre_direction, normal) / dot(direction, normal);
+  return range > 0.5 * distance && range < 2.0 * distance ? range : distance;
+}
 
 void main()
 {
@@ -18,20 +26,22 @@ void main()
   vec3 reflectance = texelFetch(albedo, at, 0).rgb * 0.3183098861837907;
   if (seen.z < NO_SURFACE && reflectance != vec3(0.0)) {
     vec4 probe = element(probe_slots, first_slot + id.z);
-    vec3 direction = texel_direction(id.xy);
     vec3 normal = octahedral_decode(seen.xy);
-    vec3 point = probe.xyz + direction * abs(seen.z);
-    vec3 origin = step_off(point, normal, -direction, abs(seen.z));
+    vec3 centre_direction = texel_direction(id.xy);
+    uvec3 key = uvec3(uint(probe.w), uint(id.y * FACE + id.x), uint(seed));
     vec3 irradiance = vec3(0.0);
-    for (int light = 0; light < light_count; light++) {
-      uvec3 key = uvec3(uint(probe.w), uint(id.y * FACE + id.x), uint(light) * 0x9E3779B9u + uint(seed));
-      irradiance += light_irradiance(light, point, origin, normal, key, samples);
-    }
+    for (int i = 0; i < samples; i++) {
+      vec2 place = samples == 1 ? vec2(0.5) : sample_r2(key + uvec3(0u, 0u, 0x632BE5ABu), i);
+      vec3 direction = texel_place_direction(id.xy, place);
+      float range = plane_distance(centre_direction, abs(seen.z), normal, direction);
+      vec3 point = probe.xyz + direction * range;
+      vec3 origin = step_off(point, normal, -direction, range);
+      irradiance += lamps_irradiance(point, origin, normal, key, i);
 #ifdef HAS_EMITTERS
-    uvec3 key = uvec3(uint(probe.w), uint(id.y * FACE + id.x), 0x2545F491u + uint(seed));
-    irradiance += emitter_irradiance(point, origin, normal, key, samples);
+      irradiance += emitter_irradiance(point, origin, normal, key + uvec3(0u, 0u, 0x2545F491u), i);
 #endif
-    radiance += reflectance * irradiance;
+    }
+    radiance += reflectance * irradiance / float(samples);
   }
   imageStore(source, at, vec4(radiance, 0.0));
 }

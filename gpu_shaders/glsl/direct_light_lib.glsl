@@ -29,12 +29,6 @@ void tangent_frame(vec3 n, out vec3 t, out vec3 b)
   b = vec3(c, s + n.y * n.y * a, -n.y);
 }
 
-/* Is one sample exact, because the light has no extent? */
-bool light_is_sharp(vec4 position_kind, vec4 color_radius)
-{
-  return int(position_kind.w) < RECTANGLE && color_radius.w == 0.0;
-}
-
 float spot_mask(vec3 towards, vec3 back, vec4 parameters)
 {
   float x = clamp((dot(towards, back) - parameters.x) * parameters.y, 0.0, 1.0);
@@ -120,22 +114,28 @@ LightSample sample_light(int light, vec3 point, vec2 u)
   return light_sample;
 }
 
-/* Irradiance of one light at a surface, `samples` shadow rays where the light is soft. */
-vec3 light_irradiance(int light, vec3 point, vec3 origin, vec3 normal, uvec3 key, int samples)
+/* Irradiance of one light at a surface: one shadow ray to the place on the light that `u` picks. */
+vec3 light_irradiance(int light, vec3 point, vec3 origin, vec3 normal, vec2 u)
 {
-  vec4 position_kind = element(lights, 6 * light);
-  vec4 color_radius = element(lights, 6 * light + 1);
-  bool shadow = element(lights, 6 * light + 4).w != 0.0;
-  int count = light_is_sharp(position_kind, color_radius) ? 1 : samples;
-  vec3 sum = vec3(0.0);
-  for (int i = 0; i < count; i++) {
-    LightSample light_sample = sample_light(light, point, sample_r2(key, i));
-    float cosine = dot(light_sample.direction, normal);
-    if (cosine > 0.0 && light_sample.irradiance != vec3(0.0)) {
-      if (!shadow || !trace_any(origin, light_sample.direction, light_sample.distance * 0.9999)) {
-        sum += light_sample.irradiance * cosine;
-      }
-    }
+  LightSample light_sample = sample_light(light, point, u);
+  float cosine = dot(light_sample.direction, normal);
+  if (cosine <= 0.0 || light_sample.irradiance == vec3(0.0)) {
+    return vec3(0.0);
   }
-  return sum / float(count);
+  bool shadow = element(lights, 6 * light + 4).w != 0.0;
+  if (shadow && trace_any(origin, light_sample.direction, light_sample.distance * 0.9999)) {
+    return vec3(0.0);
+  }
+  return light_sample.irradiance * cosine;
+}
+
+/* Irradiance of all lamps: sample `index` of the sequences of `key`. */
+vec3 lamps_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
+{
+  vec3 sum = vec3(0.0);
+  for (int light = 0; light < light_count; light++) {
+    vec2 u = sample_r2(key + uvec3(0u, 0u, uint(light) * 0x9E3779B9u), index);
+    sum += light_irradiance(light, point, origin, normal, u);
+  }
+  return sum;
 }

@@ -57,40 +57,38 @@ EmitterSample sample_emitter(vec3 u)
   return chosen;
 }
 
-/* Irradiance of all sampled emitters at a surface, `samples` shadow rays. */
-vec3 emitter_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int samples)
+/* Irradiance of all sampled emitters at a surface, one shadow ray: sample `index` of the sequence of `key`. */
+vec3 emitter_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
 {
-  vec3 sum = vec3(0.0);
-  for (int i = 0; i < samples; i++) {
-    vec3 best_irradiance = vec3(0.0), best_direction = vec3(0.0);
-    float best_distance = 0.0, total = 0.0, best_weight = 0.0;
-    float choice = sample_r3(key + uvec3(0x68E31DA4u, 0u, 0u), i).x;
-    for (int j = 0; j < CANDIDATES; j++) {
-      EmitterSample emitter = sample_emitter(sample_r3(key, i * CANDIDATES + j));
-      vec3 offset = emitter.point - point;
-      float squared = max(dot(offset, offset), 1.0e-20);
-      float distance = sqrt(squared);
-      vec3 direction = offset / distance;
-      float cosines = max(dot(direction, normal), 0.0) * abs(dot(direction, emitter.normal));
-      vec3 irradiance = emitter.radiance * (cosines / (squared * emitter.density));
-      /* no uniform emitter gives more than π·L: near a lamp the estimate is bounded by what is possible */
-      irradiance = min(irradiance, emitter.radiance * (3.141592653589793 * float(CANDIDATES)));
-      float weight = irradiance.r + irradiance.g + irradiance.b;
-      total += weight;
-      if (weight > 0.0 && choice * total < weight) {
-        choice = choice * total / weight;
-        best_irradiance = irradiance;
-        best_direction = direction;
-        best_distance = distance;
-        best_weight = weight;
-      }
-      else if (total > 0.0) {
-        choice = (choice * total - weight) / (total - weight);
-      }
+  vec3 best_irradiance = vec3(0.0), best_direction = vec3(0.0);
+  float best_distance = 0.0, best_weight = 0.0, total = 0.0;
+  float choice = sample_r3(key + uvec3(0x68E31DA4u, 0u, 0u), index).x;
+  for (int i = 0; i < CANDIDATES; i++) {
+    EmitterSample emitter = sample_emitter(sample_r3(key, index * CANDIDATES + i));
+    vec3 offset = emitter.point - point;
+    float squared = max(dot(offset, offset), 1.0e-20);
+    float distance = sqrt(squared);
+    vec3 direction = offset / distance;
+    float cosines = max(dot(direction, normal), 0.0) * abs(dot(direction, emitter.normal));
+    vec3 irradiance = emitter.radiance * (cosines / (squared * emitter.density));
+    /* no uniform emitter gives more than π·L: near a lamp the estimate is bounded by what is possible */
+    irradiance = min(irradiance, emitter.radiance * (3.141592653589793 * float(CANDIDATES)));
+    float weight = irradiance.r + irradiance.g + irradiance.b;
+    total += weight;
+    /* one number chooses among all candidates: what is left of it is spread over 0..1 again */
+    if (weight > 0.0 && choice * total < weight) {
+      choice = choice * total / weight;
+      best_irradiance = irradiance;
+      best_direction = direction;
+      best_distance = distance;
+      best_weight = weight;
     }
-    if (best_weight > 0.0 && !trace_any(origin, best_direction, best_distance * 0.9999)) {
-      sum += best_irradiance * (total / (best_weight * float(CANDIDATES)));
+    else if (total > weight) {
+      choice = (choice * total - weight) / (total - weight);
     }
   }
-  return sum / float(samples);
+  if (best_weight == 0.0 || trace_any(origin, best_direction, best_distance * 0.9999)) {
+    return vec3(0.0);
+  }
+  return best_irradiance * (total / (best_weight * float(CANDIDATES)));
 }

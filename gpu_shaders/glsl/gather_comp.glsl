@@ -14,18 +14,6 @@ vec3 sample_cosine(vec3 normal, vec2 u)
   return normalize(disk.x * t + disk.y * b + sqrt(max(1.0 - u.x, 0.0)) * normal);
 }
 
-vec3 direct_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key)
-{
-  vec3 irradiance = vec3(0.0);
-  for (int light = 0; light < light_count; light++) {
-    irradiance += light_irradiance(light, point, origin, normal, key + uvec3(0u, 0u, uint(light) * 0x9E3779B9u), 1);
-  }
-#ifdef HAS_EMITTERS
-  irradiance += emitter_irradiance(point, origin, normal, key, 1);
-#endif
-  return irradiance;
-}
-
 vec3 end_irradiance(vec3 point, vec3 normal)
 {
   float weights[8];
@@ -57,7 +45,10 @@ vec3 trace_path(vec3 origin, vec3 normal, uvec3 key, int path)
     origin = step_off(surface.position, surface.normal, -direction, hit.distance);
     normal = surface.normal;
     uvec3 light_key = pcg3d(bounce_key + uvec3(0u, 0u, uint(path)));
-    vec3 irradiance = direct_irradiance(surface.position, origin, normal, light_key);
+    vec3 irradiance = lamps_irradiance(surface.position, origin, normal, light_key, 0);
+#ifdef HAS_EMITTERS
+    irradiance += emitter_irradiance(surface.position, origin, normal, light_key, 0);
+#endif
     if (bounce == bounces - 1) {
       irradiance += end_irradiance(surface.position, normal);
     }

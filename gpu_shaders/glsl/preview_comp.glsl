@@ -17,10 +17,7 @@ vec3 shade_surface(Surface surface, vec3 direction, float distance, uvec3 key)
   vec3 irradiance = vec3(0.0);
   vec3 origin = step_off(surface.position, surface.normal, -direction, distance);
   if (show_direct != 0) {
-    for (int light = 0; light < light_count; light++) {
-      uvec3 light_key = key + uvec3(0u, 0u, uint(light) * 0x9E3779B9u);
-      irradiance += light_irradiance(light, surface.position, origin, surface.normal, light_key, 1);
-    }
+    irradiance = lamps_irradiance(surface.position, origin, surface.normal, key, 0);
   }
   float weights[8];
   int first_node = node_index(lookup_cell(surface.position, surface.normal, weights));
