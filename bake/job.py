@@ -16,12 +16,12 @@ from typing import Protocol
 
 import numpy as np
 
-from ..core import culling, dilation
+from ..core import culling, dilation, relocation
 from ..core.conventions import ACTIVE, CULLED, DEPTH_EDGE, INVALID
 from ..core.errors import Cancelled, InputError
 from ..core.field import Field
 from ..core.grid import Grid
-from ..core.orientation import flipped_objects
+from ..core.orientation import ShellVote
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..gpu_shaders.backend import GpuBackend, Surfaces
@@ -29,7 +29,6 @@ from ..gpu_shaders.scene_textures import SceneTextures
 from .capture_choice import choose_capture
 from .convergence import Convergence
 
-_VOTERS = 512  # probes that decide which objects are inside out
 _INVALID_SHARE = 0.5  # of the sphere showing back faces
 
 
@@ -99,24 +98,31 @@ def bake_steps(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, repo
     with _timed(result, "capture"):
         result.capture, reason = choose_capture(settings, backend.scene.triangle_count)
         result.notes.append(reason)
-        _vote_on_orientation(backend, nodes, positions, result)
         backend.set_probes(nodes, positions)
         backend.allocate_field()
     yield
 
-    batches = _Batches(backend, len(nodes), result.capture)
+    batches = _Batches(backend, len(nodes), result.capture, result)
     if not batches.resident:
         result.notes.append(f"texel surfaces of {len(nodes)} probes exceed the memory budget of {settings.memory_mib} MiB: "
                             "they are captured again in every iteration")
     reporter.phase("capture", len(nodes))
+    vote = ShellVote(backend.object_count)
     for index in range(batches.count):
-        with _timed(result, "capture"):
-            surfaces = batches.captured(index)
-            backend.statistics(surfaces)
-            reporter.advance(surfaces.count)
+        surfaces = batches.captured(index)
+        vote.add(backend.sightings(surfaces))
+        reporter.advance(surfaces.count)
         yield
     with _timed(result, "capture"):
+        backend.set_shells(vote.shells())
+    yield from _each_statistics(batches, backend)
+    shares = backend.read_shares()
+    offset = np.zeros((grid.count, 3), np.float32)
+    moved = yield from _relocate(batches, backend, grid, nodes, shares, offset)
+    if moved:
+        result.notes.append(f"{moved} probes in or behind walls were moved out, at most half a cell")
         shares = backend.read_shares()
+    with _timed(result, "capture"):
         state[nodes[shares[:, 0] > _INVALID_SHARE]] = INVALID
         if not (state == ACTIVE).any():
             raise InputError(f"{grid.name}: every probe sits inside solid geometry; move or enlarge the volume")
@@ -163,7 +169,7 @@ def bake_steps(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, repo
         result.converged = convergence.converged
         result.change = convergence.changes
         result.notes.append(convergence.reason)
-        result.field = _finish(backend, grid, settings, state, nodes, shares)
+        result.field = _finish(backend, grid, settings, state, nodes, shares, offset)
     result.counts = {"total": grid.count, "active": int((state == ACTIVE).sum()), "culled": int((state == CULLED).sum()),
                      "invalid": int((state == INVALID).sum())}
     if not np.isfinite(result.field.coefficients).all():
@@ -173,36 +179,99 @@ def bake_steps(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, repo
 class _Batches:
     """Texel surfaces of all active probes in batches, kept while they fit the budget and captured again where not."""
 
-    def __init__(self, backend: GpuBackend, slots: int, method: str):
+    def __init__(self, backend: GpuBackend, slots: int, method: str, result: BakeResult):
         self._backend = backend
         self._method = method
         self._slots = slots
+        self._result = result
         self.resident = slots <= backend.probes_in_budget
         self._size = min(backend.probes_per_batch, slots)
         self.count = -(-slots // self._size)
         self._kept: dict[int, Surfaces] = {}
-        self._lit: set[int] = set()
+        self._weighed: set[int] = set()
+
+    def range(self, index: int) -> tuple[int, int]:
+        """First slot and number of slots of batch ``index``."""
+        first = index * self._size
+        return first, min(self._size, self._slots - first)
+
+    def slots_of(self, index: int, slots: np.ndarray) -> np.ndarray:
+        """Those of ``slots`` that are in batch ``index``."""
+        first, count = self.range(index)
+        return slots[(slots >= first) & (slots < first + count)]
 
     def captured(self, index: int) -> Surfaces:
-        """Batch ``index`` with geometry, albedo and emission."""
-        if self.resident and index in self._kept:
+        """Batch ``index`` with geometry, albedo, emission and source, before it knows where it reads the field."""
+        if index in self._kept and index not in self._weighed:
             return self._kept[index]
-        first = index * self._size
         if not self.resident:
             self._kept.clear()  # frees the images of the batch before
-        surfaces = self._kept[index] = self._backend.surfaces(first, min(self._size, self._slots - first))
-        self._backend.capture(surfaces, self._method)
+            self._weighed.clear()
+        with _timed(self._result, "capture"):
+            surfaces = self._kept[index] = self._backend.surfaces(*self.range(index))
+            self._backend.capture(surfaces, self._method)
+        with _timed(self._result, "light"):
+            self._backend.direct_light(surfaces)
+        return surfaces
+
+    def capture_again(self, index: int, slots: np.ndarray) -> Surfaces:
+        """Batch ``index`` after the probes in ``slots`` (L,), ascending and in this batch, have moved."""
+        surfaces = self.captured(index)
+        layers = slots - surfaces.first
+        for run in np.split(layers, np.flatnonzero(np.diff(layers) > 1) + 1):
+            with _timed(self._result, "capture"):
+                self._backend.capture(surfaces, self._method, int(run[0]), len(run))
+            with _timed(self._result, "light"):
+                self._backend.direct_light(surfaces, int(run[0]), len(run))
         return surfaces
 
     def lit(self, index: int) -> Surfaces:
-        """Batch ``index`` with direct light and lookup weights too."""
-        if self.resident and index in self._lit:
+        """Batch ``index`` ready for light iterations."""
+        if index in self._weighed and index in self._kept:
             return self._kept[index]
         surfaces = self.captured(index)
         self._backend.weigh_lookups(surfaces)
-        self._backend.direct_light(surfaces)
-        self._lit.add(index)
+        self._weighed.add(index)
         return surfaces
+
+
+def _each_statistics(batches: _Batches, backend: GpuBackend) -> Iterator[None]:
+    for index in range(batches.count):
+        backend.statistics(batches.captured(index))
+        yield
+
+
+def _relocate(batches: _Batches, backend: GpuBackend, grid: Grid, nodes: np.ndarray, shares: np.ndarray,
+              offset: np.ndarray) -> Iterator[None]:
+    """Moves probes that stand in or behind walls, fills ``offset`` (P, 3) in metres and returns how many moved.
+
+    A probe that sees no light from its new place either goes back.
+    """
+    candidates = np.flatnonzero(relocation.misplaced(shares, _INVALID_SHARE))
+    if not len(candidates):
+        return 0
+    home = grid.positions()[nodes]
+    step = np.zeros((len(nodes), 3))
+    for index in range(batches.count):
+        surfaces = batches.captured(index)
+        slots = batches.slots_of(index, candidates)
+        if len(slots):
+            step[slots] = relocation.moves(grid, home[slots], backend.exits(surfaces, slots - surfaces.first))
+        yield
+    moved = np.flatnonzero(step.any(axis=1))
+    for changed in (moved, None):
+        if changed is None:  # second round: what saw no light goes home
+            dark = backend.read_shares()[moved]
+            changed = moved[(dark[:, 2] == 0) | (dark[:, 0] > _INVALID_SHARE)]
+            step[changed] = 0.0
+        backend.set_probes(nodes, home + step)
+        for index in range(batches.count):
+            slots = batches.slots_of(index, changed)
+            if len(slots):
+                backend.statistics(batches.capture_again(index, slots))
+            yield
+    offset[nodes] = step
+    return int(step.any(axis=1).sum())
 
 
 def _cull(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, result: BakeResult) -> np.ndarray:
@@ -213,25 +282,14 @@ def _cull(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, result: B
     return np.where(needed, ACTIVE, CULLED).astype(np.uint8)
 
 
-def _vote_on_orientation(backend: GpuBackend, nodes: np.ndarray, positions: np.ndarray, result: BakeResult) -> None:
-    """Lets probes spread over the grid decide which objects have their normals the wrong way round."""
-    voters = np.unique(np.linspace(0, len(nodes) - 1, min(_VOTERS, len(nodes))).astype(int))
-    voters = voters[: backend.probes_per_batch]
-    backend.set_probes(nodes[voters], positions[voters])
-    surfaces = backend.surfaces(0, len(voters))
-    backend.capture(surfaces, result.capture)
-    flips = flipped_objects(backend.sightings(surfaces), backend.object_count)
-    backend.set_flips(flips)
-    if flips.any():
-        result.notes.append(f"{int(flips.sum())} objects are seen mostly from behind; their normals count as flipped")
-
-
 def _finish(backend: GpuBackend, grid: Grid, settings: BakeSettings, state: np.ndarray, nodes: np.ndarray,
-            shares: np.ndarray) -> Field:
+            shares: np.ndarray,
+            offset: np.ndarray) -> Field:
     """Reads the field back and completes it for probes without light of their own."""
     baked = Field.empty(grid, settings.bands)
     baked.state[:] = state
     baked.validity[nodes] = 1.0 - shares[:, 0]
+    baked.offset[:] = offset
     baked.coefficients = dilation.fill(grid, backend.read_field(), state == ACTIVE)
     baked.depth[nodes] = backend.read_depth()
     return baked

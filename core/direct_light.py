@@ -148,10 +148,15 @@ def _sample_point(light: Light, points: np.ndarray, u: np.ndarray) -> LightSampl
 
 
 def spot_mask(light: Light, directions: np.ndarray) -> np.ndarray:
-    """(N,) share of a spot's light sent against ``directions`` (N, 3): smoothstep in the cosine, 1 inside, 0 outside the cone."""
+    """(N,) share of a spot's light sent against ``directions`` (N, 3): smoothstep in the cosine, 1 inside, 0 outside the cone.
+
+    The cone lives in the object's own frame, so a scaled object stretches it (Cycles, ``spot_light_attenuation``).
+    """
+    local = directions @ np.asarray(light.matrix, float)[:3, :3] / np.asarray(light.spot_scale)
+    local /= np.linalg.norm(local, axis=1, keepdims=True)
     cosine = np.cos(light.spot_size / 2)
     width = max((1 - cosine) * light.spot_blend, _LEAST_BLEND)
-    x = np.clip((directions @ np.asarray(light.matrix, float)[:3, 2] - cosine) / width, 0, 1)
+    x = np.clip((local[:, 2] - cosine) / width, 0, 1)
     return x * x * (3 - 2 * x)
 
 

@@ -1,18 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which objects have their normals the wrong way round.
+"""Which objects' back faces are not the inside of a solid.
 
 A room made from a cube primitive is seen from behind by every probe in it, and so is a solid by the probes that are stuck inside; only
-the latter are invalid. The probes vote: an object that most of the probes seeing it see from behind is taken as inside out, and what
-they see of it counts as front faces.
+the latter are invalid. What tells them apart is light: it is dark inside a solid, and no window shows the world. Objects whose back
+faces are seen lit, or by probes that also see background, are shells: single walls, rooms with their normals the wrong way round.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+_LIT_SHARE = 0.1  # of the back faces seen: less is a light leak
+_OPEN_SHARE = 0.01  # of a probe's directions that see background: the inside of a solid sees none
+
 
 def flipped_objects(sightings: np.ndarray, object_count: int) -> np.ndarray:
-    """(object_count,) bool from ``sightings`` (P, S): per probe, ±(object + 1) of S directions, negative from behind, 0 nothing."""
+    """Without light to tell, probes vote: objects that most of the probes seeing them see from behind.
+
+    (object_count,) bool from ``sightings`` (P, S): per probe, ±(object + 1) of S directions, negative from behind, 0 nothing."""
     sightings = np.asarray(sightings, np.int64)
     probe = np.broadcast_to(np.arange(len(sightings))[:, None], sightings.shape)
     seen = sightings != 0
@@ -21,3 +26,26 @@ def flipped_objects(sightings: np.ndarray, object_count: int) -> np.ndarray:
     sides = np.bincount(inverse, np.sign(sightings[seen]), len(pairs))
     votes = np.bincount(pairs % object_count, np.sign(sides), object_count)
     return votes < 0
+
+
+class ShellVote:
+    """Collects what probes see of objects' back faces, batch by batch."""
+
+    def __init__(self, object_count: int):
+        self._behind = np.zeros(object_count)
+        self._lit = np.zeros(object_count)
+
+    def add(self, sightings: np.ndarray) -> None:
+        """``sightings`` (P, S): per probe ±(object + 1) of S directions, negative from behind, half a unit farther from zero where
+        lit; 0 background."""
+        size = np.abs(sightings)
+        behind = sightings < 0
+        item = np.floor(size).astype(np.int64) - 1
+        open_ = (sightings == 0).mean(axis=1) >= _OPEN_SHARE
+        lit = behind & ((size > item + 1.25) | open_[:, None])
+        self._behind += np.bincount(item[behind], minlength=len(self._behind))
+        self._lit += np.bincount(item[lit], minlength=len(self._lit))
+
+    def shells(self) -> np.ndarray:
+        """(object_count,) bool."""
+        return (self._lit > 0) & (self._lit >= _LIT_SHARE * self._behind)

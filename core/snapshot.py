@@ -79,6 +79,7 @@ class Light:
     angle: float = 0.0
     spot_size: float = 0.0
     spot_blend: float = 0.0
+    spot_scale: tuple[float, float, float] = (1.0, 1.0, 1.0)  # of the object: stretches the cone, as in Cycles
     shape: str = "RECTANGLE"  # RECTANGLE | ELLIPSE
     size_x: float = 0.0
     size_y: float = 0.0

@@ -62,7 +62,7 @@ class GpuBackend:
         self.coefficients = settings.bands**2
         self.scene = SceneTextures(snapshot, grid.center, sampling_density(snapshot, grid))
         self.object_count = max(len(snapshot.object_names), 1)
-        self._object_flips = upload(np.zeros((self.object_count, 4)), "objects")
+        self._shells = upload(np.zeros((self.object_count, 4)), "objects")
         weights = np.zeros((self.face * self.face, 4), np.float32)
         weights[:, 0] = texel_solid_angles(self.face).ravel()
         self._texel_weights = upload(weights, "texels")
@@ -124,19 +124,20 @@ class GpuBackend:
         textures = {name: layers(self.face, 6 * self.face, count, pixel) for name, pixel in _SURFACE_FORMATS.items()}
         return Surfaces(first, count, textures)
 
-    def capture(self, surfaces: Surfaces, method: str) -> None:
-        """Fills geometry, albedo and emission. ``method`` is "raster" or "trace"."""
-        for start in range(0, surfaces.count, self._probes_per_capture):
-            count = min(self._probes_per_capture, surfaces.count - start)
-            first_slot = surfaces.first + start
-            hits = self._hit_images(count)
+    def capture(self, surfaces: Surfaces, method: str, start: int = 0, count: int | None = None) -> None:
+        """Fills geometry, albedo and emission of all or of ``count`` probes from ``start``. ``method``: "raster" or "trace"."""
+        stop = surfaces.count if count is None else start + count
+        for first_layer in range(start, stop, self._probes_per_capture):
+            part = min(self._probes_per_capture, stop - first_layer)
+            first_slot = surfaces.first + first_layer
+            hits = self._hit_images(part)
             if method == "raster":
                 if self._raster is None:
                     self._raster = RasterCapture(self.scene, self.face, hits.layers // 6)
-                self._raster(self._positions[first_slot:first_slot + count], first_slot, self._probe_slots, hits.texture)
+                self._raster(self._positions[first_slot:first_slot + part], first_slot, self._probe_slots, hits.texture)
             else:
-                self._trace(first_slot, count, hits)
-            self._resolve(first_slot, start, count, hits, surfaces)
+                self._trace(first_slot, part, hits)
+            self._resolve(first_slot, first_layer, part, hits, surfaces)
 
     def _hit_images(self, count: int):
         if self._hits is None or self._hits.layers < count * 6:
@@ -165,26 +166,40 @@ class GpuBackend:
         self._dispatch_texels(shader, count)
 
     def sightings(self, surfaces: Surfaces) -> np.ndarray:
-        """(count, 384) int: which objects each probe sees, see core/orientation.py. Needs freshly captured surfaces."""
+        """(count, 384): which objects each probe sees, see core/orientation.py. Needs captured surfaces with source."""
         shader = program("object_sightings_comp", FACE=self.face)
         result = allocate(surfaces.count * 96, "sightings")
-        shader.uniform_sampler("geometry", surfaces.textures["geometry"])
+        for name in ("geometry", "emission", "source"):
+            shader.uniform_sampler(name, surfaces.textures[name])
         shader.image("sightings", result)
         gpu.compute.dispatch(shader, surfaces.count, 1, 1)
-        return read(result, surfaces.count * 96).astype(int).reshape(surfaces.count, -1)
+        return read(result, surfaces.count * 96).reshape(surfaces.count, -1)
 
-    def set_flips(self, flips: np.ndarray) -> None:
-        """Objects (object_count,) bool whose back faces count as front faces."""
+    def set_shells(self, shells: np.ndarray) -> None:
+        """Objects (object_count,) bool whose back faces do not tell the inside of a solid."""
         rows = np.zeros((self.object_count, 4), np.float32)
-        rows[: len(flips), 0] = flips
-        self._object_flips = upload(rows, "objects")
+        rows[: len(shells), 0] = shells
+        self._shells = upload(rows, "objects")
+
+    def exits(self, surfaces: Surfaces, layers_: np.ndarray) -> np.ndarray:
+        """(L, 6, 4) offset and distance of the nearest surface in each face, for the probes in ``layers_`` (L,)."""
+        shader = program("probe_exits_comp", FACE=self.face)
+        rows = np.zeros((len(layers_), 4), np.float32)
+        rows[:, 0] = layers_
+        slots, result = upload(rows, "probes"), allocate(len(layers_) * 6, "exits")
+        shader.uniform_sampler("slots", slots)
+        shader.uniform_sampler("geometry", surfaces.textures["geometry"])
+        shader.image("exits", result)
+        gpu.compute.dispatch(shader, len(layers_), 1, 1)
+        return read(result, len(layers_) * 6).reshape(-1, 6, 4)
 
     def statistics(self, surfaces: Surfaces) -> None:
-        """Depth moments and shares of back faces and background. Needs freshly captured surfaces."""
+        """Depth moments and what the probes see as a whole. Needs captured surfaces with source and without lookup weights."""
         shader = program("probe_statistics_comp", FACE=self.face)
         shader.uniform_sampler("texel_weights", self._texel_weights)
-        shader.uniform_sampler("object_flips", self._object_flips)
-        shader.uniform_sampler("geometry", surfaces.textures["geometry"])
+        shader.uniform_sampler("shells", self._shells)
+        for name in ("geometry", "emission", "source"):
+            shader.uniform_sampler(name, surfaces.textures[name])
         shader.image("depth_moments", self._moments)
         shader.image("probe_shares", self._shares)
         shader.uniform_int("first_slot", (surfaces.first,))
@@ -193,8 +208,8 @@ class GpuBackend:
         gpu.compute.dispatch(shader, surfaces.count, 1, 1)
 
     def read_shares(self) -> np.ndarray:
-        """(slots, 2) float32: share of back faces and of background in what each active probe sees."""
-        return read(self._shares, len(self._nodes))[:, :2]
+        """(slots, 4) float32 shares of the sphere: back faces of solids, background, lit, all back faces."""
+        return read(self._shares, len(self._nodes))
 
     def read_depth(self) -> np.ndarray:
         """(slots, DEPTH_EDGE², 2) float32 depth moments."""
@@ -215,18 +230,21 @@ class GpuBackend:
         self._set_range(shader, surfaces)
         self._dispatch_texels(shader, surfaces.count)
 
-    def direct_light(self, surfaces: Surfaces) -> None:
-        """Fills source: reflected direct light of lamps and sampled emitters, and emission as far as the field carries it."""
+    def direct_light(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> None:
+        """Fills source: reflected direct light of lamps and sampled emitters, and emission as far as the field carries
+        it; of all or of ``count`` probes from ``start``."""
         shader = program("direct_light_comp", FACE=self.face, **self.scene.light_defines)
         self.scene.bind_lights(shader)
         shader.uniform_sampler("probe_slots", self._probe_slots)
         for name in ("geometry", "albedo", "emission"):
             shader.uniform_sampler(name, surfaces.textures[name])
         shader.image("source", surfaces.textures["source"])
-        self._set_range(shader, surfaces)
+        count = surfaces.count if count is None else count
+        shader.uniform_int("first_slot", (surfaces.first + start,))
+        shader.uniform_int("first_layer", (start,))
         shader.uniform_int("samples", (self.settings.samples,))
         shader.uniform_int("seed", (self.settings.seed,))
-        self._dispatch_texels(shader, surfaces.count)
+        self._dispatch_texels(shader, count)
 
     def iterate(self, surfaces: Surfaces, read_field: bool) -> None:
         """One light iteration of these probes: reads the newest field and writes over the oldest."""

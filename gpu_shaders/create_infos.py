@@ -94,17 +94,26 @@ def surface_resolve_comp(info, defines):
 
 def object_sightings_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
-    _samplers(info, "geometry", kind="FLOAT_2D_ARRAY")
+    _samplers(info, "geometry", "emission", "source", kind="FLOAT_2D_ARRAY")
     _image(info, 0, "sightings")
     info.local_group_size(96, 1, 1)
     return {"compute": ["data_lib", "object_sightings_comp"]}
 
 
+def probe_exits_comp(info, defines):
+    info.define("NO_SURFACE", NO_SURFACE)
+    slot = _samplers(info, "slots")
+    _samplers(info, "geometry", kind="FLOAT_2D_ARRAY", first=slot)
+    _image(info, 0, "exits")
+    info.local_group_size(6, 1, 1)
+    return {"compute": ["data_lib", "cubemap_lib", "probe_exits_comp"]}
+
+
 def probe_statistics_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
     info.define("DEPTH_EDGE", str(DEPTH_EDGE))
-    slot = _samplers(info, "texel_weights", "object_flips")
-    _samplers(info, "geometry", kind="FLOAT_2D_ARRAY", first=slot)
+    slot = _samplers(info, "texel_weights", "shells")
+    _samplers(info, "geometry", "emission", "source", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "depth_moments", pixel="RG32F")
     _image(info, 1, "probe_shares")
     _ints(info, "first_slot", "first_layer")

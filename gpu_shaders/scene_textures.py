@@ -175,6 +175,7 @@ def pack_lights(lights: list[Light], origin: np.ndarray) -> np.ndarray:
             row[1, 3] = light.radius
             row[5, 2] = light.soft_falloff
             if light.kind == "SPOT":
+                row[2, 3], row[3, 3] = light.spot_scale[2] / light.spot_scale[0], light.spot_scale[2] / light.spot_scale[1]
                 cosine = np.cos(light.spot_size / 2)
                 row[5, :2] = cosine, 1 / max((1 - cosine) * light.spot_blend, 1e-6)
     return rows

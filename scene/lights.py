@@ -121,7 +121,8 @@ def _point(data, _scale) -> dict:
 
 
 def _spot(data, scale) -> dict:
-    return {**_point(data, scale), "spot_size": float(data.spot_size), "spot_blend": float(data.spot_blend)}
+    return {**_point(data, scale), "spot_size": float(data.spot_size), "spot_blend": float(data.spot_blend),
+            "spot_scale": tuple(float(value) for value in np.where(scale > 0, scale, 1.0))}
 
 
 def _sun(data, _scale) -> dict:

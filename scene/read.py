@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ..core.snapshot import SceneSnapshot
+from .camera import read_camera
 from .evaluation import as_in_viewport, at_render_quality, rendered_objects
 from .geometry import MeshArrays, WorldTriangles, place, read_mesh
 from .images import ImageTable
@@ -97,6 +98,7 @@ def _read(scene, view_layer, evaluate) -> SceneSnapshot:
         lights=lights.lights,
         world=read_world(scene, notices),
         volumes=find_volumes(scene),
+        camera=read_camera(scene),
         exposure=float(scene.view_settings.exposure),
         frame=scene.frame_current,
         name=scene.name,

@@ -29,9 +29,13 @@ void tangent_frame(vec3 n, out vec3 t, out vec3 b)
   b = vec3(c, s + n.y * n.y * a, -n.y);
 }
 
-float spot_mask(vec3 towards, vec3 back, vec4 parameters)
+/* The cone lives in the object's own frame: right.w and up.w undo its scale against that of the axis. */
+float spot_mask(int light, vec3 towards, vec3 back, vec4 parameters)
 {
-  float x = clamp((dot(towards, back) - parameters.x) * parameters.y, 0.0, 1.0);
+  vec4 right = element(lights, 6 * light + 2);
+  vec4 up = element(lights, 6 * light + 3);
+  vec3 local = normalize(vec3(dot(towards, right.xyz) * right.w, dot(towards, up.xyz) * up.w, dot(towards, back)));
+  float x = clamp((local.z - parameters.x) * parameters.y, 0.0, 1.0);
   return x * x * (3.0 - 2.0 * x);
 }
 
@@ -109,7 +113,7 @@ LightSample sample_light(int light, vec3 point, vec2 u)
     light_sample.irradiance = color_radius.rgb * (2.0 * one_minus_cos / (radius * radius));
   }
   if (kind == SPOT) {
-    light_sample.irradiance *= spot_mask(light_sample.direction, back_shadow.xyz, parameters);
+    light_sample.irradiance *= spot_mask(light, light_sample.direction, back_shadow.xyz, parameters);
   }
   return light_sample;
 }

@@ -1,6 +1,7 @@
-/* Which objects a probe sees, and from which side: 8×8 texels of each face, for the vote on flipped normals (core/orientation.py).
+/* Which objects a probe sees, from which side and whether lit: 8×8 texels of each face, for core/orientation.py.
  *
- * Dispatch: one group of 96 threads a probe of the batch; each writes four texels: ±(object + 1), negative from behind, 0 background.
+ * Dispatch: one group of 96 threads a probe of the batch; each writes four texels: ±(object + 1), negative from behind, half a unit
+ * farther from zero where light arrives or leaves; 0 background. Needs geometry, emission and source.
  */
 
 void main()
@@ -13,10 +14,13 @@ void main()
     ivec2 cell = ivec2(sample_index & 7, (sample_index >> 3) & 7);
     int face = sample_index >> 6;
     ivec2 texel = (2 * cell + 1) * FACE / 16;
-    vec4 seen = texelFetch(geometry, ivec3(texel.x, face * FACE + texel.y, probe), 0);
+    ivec3 at = ivec3(texel.x, face * FACE + texel.y, probe);
+    vec4 seen = texelFetch(geometry, at, 0);
     if (seen.z < NO_SURFACE) {
-      sighting[i] = seen.z < 0.0 ? -1.0 - seen.w : 1.0 + seen.w;
+      vec3 light = texelFetch(emission, at, 0).rgb + texelFetch(source, at, 0).rgb;
+      float value = seen.w + 1.0 + (light != vec3(0.0) ? 0.5 : 0.0);
+      sighting[i] = seen.z < 0.0 ? -value : value;
     }
   }
-  imageStore(sightings, ivec2((probe * 96 + lane) & 4095, (probe * 96 + lane) >> 12), sighting);
+  imageStore(sightings, element_position(probe * 96 + lane), sighting);
 }

@@ -1,12 +1,13 @@
-/* What each probe sees as a whole: the depth statistics of its lookup and the share of back faces.
+/* What each probe sees as a whole: the depth statistics of its lookup and how much of it is back faces, background and lit.
  *
  * Dispatch: one group of 64 threads a probe; thread t makes texel t of the octahedral map from 16 directions spread over one and a
  * half texels, so that neighbouring texels overlap and the map has no seams.
- * Objects in `object_flips` have their normals the wrong way round (core/orientation.py).
- * Writes depth_moments (mean, mean square of the clamped distance) and probe_shares (back-face share, background share).
+ * Back faces of `shells` do not count (core/orientation.py).
+ * Writes depth_moments (mean, mean square of the clamped distance) and probe_shares, shares of the sphere: back faces of
+ * solids, background, anything that sends light, all back faces.
  */
 
-SHARED_ vec2 partial_shares[64];
+SHARED_ vec4 partial_shares[64];
 
 void main()
 {
@@ -34,25 +35,28 @@ void main()
   }
   imageStore(depth_moments, element_position(slot * DEPTH_EDGE * DEPTH_EDGE + lane), vec4(moments / 16.0, 0.0, 0.0));
 
-  vec2 share = vec2(0.0);
+  vec4 share = vec4(0.0);
   for (int i = lane; i < 6 * FACE * FACE; i += 64) {
-    ivec2 at = ivec2(i % FACE, i / FACE);
-    vec2 seen = texelFetch(geometry, ivec3(at, layer), 0).zw;
+    ivec3 at = ivec3(i % FACE, i / FACE, layer);
+    vec2 seen = texelFetch(geometry, at, 0).zw;
     float weight = element(texel_weights, (at.y % FACE) * FACE + at.x).x;
     if (seen.x >= NO_SURFACE) {
       share.y += weight;
     }
-    else if ((seen.x < 0.0) != (element(object_flips, int(seen.y)).x != 0.0)) {
-      share.x += weight;
+    else if (seen.x < 0.0) {
+      share.w += weight;
+      share.x += element(shells, int(seen.y)).x == 0.0 ? weight : 0.0;
     }
+    vec3 light = texelFetch(emission, at, 0).rgb + texelFetch(source, at, 0).rgb;
+    share.z += light != vec3(0.0) ? weight : 0.0;
   }
   partial_shares[lane] = share;
   barrier();
   if (lane == 0) {
-    vec2 sum = vec2(0.0);
+    vec4 sum = vec4(0.0);
     for (int i = 0; i < 64; i++) {
       sum += partial_shares[i];
     }
-    imageStore(probe_shares, element_position(slot), vec4(sum / 12.566370614359172, 0.0, 0.0));
+    imageStore(probe_shares, element_position(slot), sum / 12.566370614359172);
   }
 }

@@ -9,6 +9,7 @@
  */
 
 const float NO_HIT = 3.0e38;
+const float STEP = 3.8e-6; /* of a point's magnitude: how far secondary rays step off a surface */
 
 struct Ray {
   vec3 origin;
@@ -63,18 +64,15 @@ vec4 enter_boxes(Ray ray, int node, float limit)
   return mix(vec4(NO_HIT), entry, lessThanEqual(entry, leave));
 }
 
-/* How far off the distance of a hit may be by rounding, from the corners a, b, c in the ray's frame: closer hits cannot be told from the
- * ray's own start. Matters where triangles are large: a ground plane of a kilometre would shadow itself.
- * Pharr, Jakob and Humphreys, "Physically Based Rendering", 3rd edition, section 3.9.6. */
-float distance_error(Ray ray, vec3 a, vec3 b, vec3 c, vec2 pa, vec2 pb, vec2 pc, vec3 edges, float determinant)
+/* Does the ray start on this triangle as far as float32 can tell? Corners far away are rounded so coarsely that a hit point on a ground
+ * plane of a kilometre may lie beneath it, and a ray from there would find the plane again. a, b, c: corners from the ray's
+ * origin. Where step_off already leaves the surface by more than that, nothing is ignored, so rays cannot slip out at edges of rooms. */
+bool starts_on(Ray ray, vec3 a, vec3 b, vec3 c)
 {
-  const float ulp = 5.96e-8;
-  float most_z = max(abs(a.z), max(abs(b.z), abs(c.z))) * abs(ray.shear.z);
-  vec2 most = max(abs(pa), max(abs(pb), abs(pc)));
-  vec2 error = (5.0 * ulp) * (most + most_z);
-  float error_edge = 2.0 * (2.0 * ulp * most.x * most.y + error.y * most.x + error.x * most.y);
-  float most_edge = max(abs(edges.x), max(abs(edges.y), abs(edges.z)));
-  return 3.0 * most_z * (6.0 * ulp * most_edge + error_edge) / abs(determinant);
+  vec3 most = max(abs(a), max(abs(b), abs(c)));
+  vec3 place = abs(ray.origin);
+  float rounding = 5.0e-7 * max(most.x, max(most.y, most.z)) - STEP * max(place.x, max(place.y, place.z));
+  return rounding > 0.0 && abs(dot(normalize(cross(b - a, c - a)), a)) < rounding;
 }
 
 /* Tests triangle `index`; on a hit nearer than hit.distance replaces it. Returns true where its leaf ends. */
@@ -97,7 +95,7 @@ bool intersect_triangle(Ray ray, int index, inout Hit hit)
   if (!miss && determinant != 0.0) {
     float distance = (u * a.z + v * b.z + w * c.z) * ray.shear.z / determinant;
     if (distance > 0.0 && distance < hit.distance &&
-        distance > distance_error(ray, a, b, c, pa, pb, pc, vec3(u, v, w), determinant)) {
+        !starts_on(ray, corner.xyz - ray.origin, corner1.xyz - ray.origin, corner2.xyz - ray.origin)) {
       vec2 barycentric = vec2(v, w) / determinant;
 #ifdef HAS_ALPHA
       if (corner1.w != 0.0 && is_hole(index, barycentric)) {
@@ -194,5 +192,5 @@ bool trace_any(vec3 origin, vec3 direction, float limit)
 vec3 step_off(vec3 point, vec3 normal, vec3 towards, float distance)
 {
   float magnitude = max(max(abs(point.x), abs(point.y)), max(abs(point.z), distance));
-  return point + (normal + towards) * (magnitude * 3.8e-6);
+  return point + (normal + towards) * (magnitude * STEP);
 }

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Probes that stand in a wall or behind it are moved out to where the light is (the field's ``offset``).
+
+A volume that reaches into its walls has a layer of nodes that see nothing, while the wall's surface then reads only the next layer inside. A
+probe without light whose nearest surface is close is captured from the other side of that surface, never farther than half a cell from
+its node, so that it stays the nearest probe of its part of the room.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .grid import Grid
+
+_LEAST_BEHIND = 0.25  # share of back faces, or of background, in sight of a probe that stands in or behind a wall
+_REACH = 0.5  # cells
+_MARGIN = 0.05  # cells between a moved probe and the surface it came through
+_OUTWARD_PENALTY = 0.5  # how much farther than inwards the way out of the volume counts
+
+
+def misplaced(shares: np.ndarray, invalid_share: float) -> np.ndarray:
+    """(S,) bool of probes worth moving, from shares (S, 4) of back faces of solids, background, lit and all back faces."""
+    dark = shares[:, 2] == 0
+    return (shares[:, 0] > invalid_share) | (dark & (np.maximum(shares[:, 1], shares[:, 3]) > _LEAST_BEHIND))
+
+
+def moves(grid: Grid, positions: np.ndarray, exits: np.ndarray) -> np.ndarray:
+    """(L, 3) displacement in metres of probes at world ``positions`` (L, 3), 0 where no exit is near enough.
+
+    ``exits`` (L, 6, 4) holds offset and distance of the nearest surface in each cube face. Ways towards the volume's centre are
+    preferred: what lies outside is rarely meant.
+    """
+    offset, distance = exits[..., :3].astype(float), exits[..., 3].astype(float)
+    margin = _MARGIN * float(grid.cell_size().min())
+    length = distance + margin
+    direction = offset / np.maximum(distance, 1e-20)[..., None]
+    step = direction * np.minimum(length, 1e12)[..., None]
+    inverse = np.linalg.inv(grid.matrix)[:3, :3]
+    spans = np.maximum(np.array(grid.resolution) - 1, 1) / 2.0
+    in_cells = np.abs(step @ inverse.T) * spans
+    near = (in_cells <= _REACH).all(axis=-1)
+    inward = grid.center - positions
+    inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), 1e-20)
+    cost = length * (1.0 + _OUTWARD_PENALTY * (1.0 - np.einsum("lfi,li->lf", direction, inward)))
+    cost = np.where(near, cost, np.inf)
+    best = cost.argmin(axis=1)
+    row = np.arange(len(positions))
+    return np.where(np.isfinite(cost[row, best])[:, None], step[row, best], 0.0)
