@@ -9,8 +9,8 @@ import math
 from ..core.errors import InputError
 
 # Options whose values may start with a minus sign, which argparse would take for another option.
-SIGNED_OPTIONS = ("--min", "--max", "--spacing", "--seed", "--frame", "--tolerance", "--bounces", "--gather", "--samples",
-                  "--bands", "--face", "--memory", "--resolution", "--points", "--spp")
+SIGNED_OPTIONS = ("--min", "--max", "--spacing", "--seed", "--frame", "--tolerance", "--bounces", "--gather",
+                  "--samples", "--bands", "--face", "--memory", "--resolution", "--points", "--spp", "--height")
 
 
 class Parser(argparse.ArgumentParser):
@@ -34,7 +34,7 @@ def join_signed_values(argv: list[str]) -> list[str]:
             value = next(words, None)
             if value is None:
                 joined.append(word)
-            elif len(value) > 1 and value[0] == "-" and (value[1].isdigit() or value[1] in ".-in" and _is_number(value)):
+            elif value.startswith("-") and _is_number(value):
                 joined.append(f"{word}={value}")
             else:
                 joined += [word, value]

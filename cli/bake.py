@@ -24,7 +24,7 @@ def add_arguments(parser, in_blender: bool) -> None:
         parser.add_argument("file", metavar="FILE.blend", nargs="?", help="instead of the file that Blender has open")
     else:
         parser.add_argument("file", metavar="FILE.blend")
-    parser.add_argument("-o", "--output", metavar="DIR", required=True, help="folder for the results, made where missing")
+    parser.add_argument("-o", "--output", metavar="DIR", required=True, help="folder for the results")
     volume = parser.add_argument_group("volume (default: those of the file, or one fitted to the scene)")
     volume.add_argument("--min", metavar="X,Y,Z", type=arguments.point, help="corner of an axis-aligned volume, metres")
     volume.add_argument("--max", metavar="X,Y,Z", type=arguments.point, help="the opposite corner")
@@ -41,7 +41,8 @@ def add_settings(parser) -> None:
     group = parser.add_argument_group("bake")
     group.add_argument("--bands", metavar="1..4", type=int, default=standard.bands,
                        help="spherical-harmonic bands; a fourth adds nothing to diffuse light (default %(default)s)")
-    group.add_argument("--face", metavar="N", type=int, default=standard.face, help="texels per cube face edge (default %(default)s)")
+    group.add_argument("--face", metavar="N", type=int, default=standard.face,
+                       help="texels per cube face edge (default %(default)s)")
     group.add_argument("--bounces", metavar="N|auto", type=arguments.bounces, default=standard.bounces,
                        help="light iterations; auto: until the tolerance is met (default auto)")
     group.add_argument("--tolerance", metavar="T", type=float, default=standard.tolerance,
@@ -50,8 +51,10 @@ def add_settings(parser) -> None:
                        help="bounces really traced before the field is read (default %(default)s)")
     group.add_argument("--samples", metavar="N", type=int, default=standard.samples,
                        help="shadow samples per texel and soft light (default %(default)s)")
-    group.add_argument("--capture", choices=CAPTURES, default=standard.capture, help="how probes see (default %(default)s)")
-    group.add_argument("--seed", metavar="N", type=int, default=standard.seed, help="of the sampling (default %(default)s)")
+    group.add_argument("--capture", choices=CAPTURES, default=standard.capture,
+                       help="how probes see (default %(default)s)")
+    group.add_argument("--seed", metavar="N", type=int, default=standard.seed,
+                       help="of the sampling (default %(default)s)")
     group.add_argument("--keep-all", action="store_true", help="bake every probe, cull none")
     group.add_argument("--memory", metavar="MIB", type=int, default=standard.memory_mib,
                        help="limit for GPU textures of the capture (default %(default)s)")
@@ -59,9 +62,9 @@ def add_settings(parser) -> None:
 
 def settings_from(args) -> BakeSettings:
     """Raises InputError for values out of range."""
-    return BakeSettings(bands=args.bands, face=args.face, bounces=args.bounces, tolerance=args.tolerance, gather=args.gather,
-                        samples=args.samples, capture=args.capture, seed=args.seed, keep_all=args.keep_all,
-                        memory_mib=args.memory)
+    return BakeSettings(bands=args.bands, face=args.face, bounces=args.bounces, tolerance=args.tolerance,
+                        gather=args.gather, samples=args.samples, capture=args.capture, seed=args.seed,
+                        keep_all=args.keep_all, memory_mib=args.memory)
 
 
 def check(args) -> None:

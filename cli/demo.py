@@ -12,7 +12,7 @@ NEEDS_BLENDER = NEEDS_GPU = True
 
 
 def add_arguments(parser, in_blender: bool) -> None:
-    parser.add_argument("-o", "--output", metavar="DIR", required=True, help="folder for the results, made where missing")
+    parser.add_argument("-o", "--output", metavar="DIR", required=True, help="folder for the results")
     bake.add_settings(parser)
     parser.add_argument("--quiet", action="store_true", help="no progress; warnings stay")
 

@@ -28,8 +28,8 @@ def run(args, reporter, should_stop):
 def compare(first, second) -> dict:
     """Differences of two fields of one grid over the probes that are active in both.
 
-    Per band the root mean square of the coefficients' difference, absolute and relative to that of ``first`` (None where that is zero).
-    Where the number of bands differs, the missing ones count as zero.
+    Per band the root mean square of the coefficients' difference, absolute and relative to that of ``first`` (None where
+    that is zero). Where the number of bands differs, the missing ones count as zero.
 
     Raises:
         InputError: the grids are not the same.

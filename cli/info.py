@@ -45,18 +45,19 @@ def _text(path: str, summary: dict) -> str:
     def triple(values):
         return " × ".join(f"{value:.4g}" for value in values)
 
-    probes, bounds, light = summary["probes"], summary["bounds"], summary["mean_radiance"]
+    probes, light = summary["probes"], summary["mean_radiance"]
+    low, high = (" ".join(f"{value:.4g}" for value in summary["bounds"][corner]) for corner in ("min", "max"))
     major, minor = summary["format_version"]
     lines = [
         f"{path}: probe file {major}.{minor}, volume '{summary['volume']['name']}'",
-        f"  probes     {triple(summary['resolution'])} = {probes['total']}: {probes['active']} active, {probes['culled']} culled, "
-        f"{probes['invalid']} invalid",
-        f"  box        {' '.join(f'{v:.4g}' for v in bounds['min'])}  to  {' '.join(f'{v:.4g}' for v in bounds['max'])} m, "
-        f"spacing {triple(summary['spacing'])} m",
+        f"  probes     {triple(summary['resolution'])} = {probes['total']}: {probes['active']} active, "
+        f"{probes['culled']} culled, {probes['invalid']} invalid",
+        f"  box        {low}  to  {high} m, spacing {triple(summary['spacing'])} m",
         f"  bands      {summary['bands']}",
     ]
     if light:
-        lines.append(f"  radiance   mean per active probe {light['min']:.4g} to {light['max']:.4g}, average {light['mean']:.4g}")
+        lines.append(f"  radiance   mean per active probe {light['min']:.4g} to {light['max']:.4g}, "
+                     f"average {light['mean']:.4g}")
     if "device" in summary:
         lines.append(f"  device     {summary['device']}")
     if isinstance(summary.get("settings"), dict):

@@ -5,8 +5,8 @@ A command is a module of this folder with
 
 * ``HELP``: one line; ``NEEDS_BLENDER``, ``NEEDS_GPU``: what it runs on;
 * ``add_arguments(parser, in_blender)``;
-* ``run(args, reporter, should_stop) -> (summary, exit status)``: does the work; the summary is printed as JSON, below what
-  ``reporter.result`` was given. What a command prints itself is lost: Blender's operators print to the same stream;
+* ``run(args, reporter, should_stop) -> (summary, exit status)``: does the work; the summary is printed as JSON, below
+  what ``reporter.result`` was given. What a command prints itself is lost: Blender's operators print to that stream;
 
 and optionally ``check(args)``, quick checks that need no Blender, made before one is started.
 """

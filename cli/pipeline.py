@@ -62,7 +62,7 @@ def start_gpu(reporter, stopwatch: Stopwatch) -> None:
 def check_snapshot(snapshot: SceneSnapshot, reporter) -> None:
     """Refuses a scene without surfaces and passes on what the reader warns of."""
     if not len(snapshot.triangles):
-        raise InputError(f"scene '{snapshot.name}' has no surface that renders; add a mesh, or enable one for rendering")
+        raise InputError(f"scene '{snapshot.name}' has no surface that renders; add a mesh or enable one for rendering")
     for warning in snapshot.warnings:
         reporter.warn(warning)
 
@@ -84,7 +84,7 @@ def bake_volumes(snapshot: SceneSnapshot, grids: list[Grid], settings: BakeSetti
             reporter.note(note)
         if not result.converged:
             reporter.warn(f"{grid.name}: the light has not settled after {result.iterations} iterations; the files are "
-                          "written and marked. Raise --bounces or --tolerance, or darken materials that reflect everything")
+                          "written and marked. Raise --bounces or --tolerance, or darken materials that reflect all light")
         results.append(result)
     return results
 
@@ -124,8 +124,8 @@ def write_results(title: str, snapshot: SceneSnapshot, settings: BakeSettings, r
 def _summary(results, device: str, settings: BakeSettings, stopwatch: Stopwatch, reporter) -> dict:
     states = np.concatenate([result.field.state for result in results])
     return {
-        "probes": {"total": len(states), "active": int((states == ACTIVE).sum()), "culled": int((states == CULLED).sum()),
-                   "invalid": int((states == INVALID).sum())},
+        "probes": {"total": len(states), "active": int((states == ACTIVE).sum()),
+                   "culled": int((states == CULLED).sum()), "invalid": int((states == INVALID).sum())},
         "iterations": max(result.iterations for result in results),
         "converged": all(result.converged for result in results),
         "seconds": stopwatch.totals(),

@@ -16,7 +16,7 @@ class Reporter:
 
     A job calls ``phase`` when a new kind of work starts, ``advance`` as it goes, ``note`` for facts worth reading and
     ``warn`` for what the user should act on. ``quiet`` silences all but warnings. Every warning is kept, once, in
-    ``warnings``. ``result`` takes text for people that belongs on standard output, above the JSON; it is kept in ``results``.
+    ``warnings``. ``result`` takes text that belongs on standard output, above the JSON; it is kept in ``results``.
     """
 
     def __init__(self, stream=None, quiet: bool = False, clock=time.monotonic):

@@ -60,14 +60,15 @@ def ensure(say) -> str | None:
         return None
     command = install_command(packages)
     if shutil.which("apt-get") is None:
-        libraries = [library for library in (*LIBRARIES, "a Mesa driver") if not _loads(library)]
-        return f"system libraries for a GPU context are missing ({', '.join(libraries)}); install them with your package manager"
+        return ("system libraries for a GPU context are missing; install with your package manager what Debian calls "
+                f"{', '.join(packages)}")
     if os.geteuid() != 0:
         return f"system libraries for a GPU context are missing; install them with: sudo sh -c '{command}'"
     say(f"installing system libraries for a GPU context: {command}")
-    quiet = {"stdin": subprocess.DEVNULL, "stdout": sys.stderr.fileno(), "env": {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}}
-    for step in (["apt-get", "-qq", "update"], ["apt-get", "-qq", "install", "-y", "--no-install-recommends", *packages]):
-        if subprocess.run(step, check=False, **quiet).returncode != 0:
+    environment = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
+    install = ["apt-get", "-qq", "install", "-y", "--no-install-recommends", *packages]
+    for step in (["apt-get", "-qq", "update"], install):
+        if subprocess.run(step, check=False, env=environment, stdin=subprocess.DEVNULL, stdout=2).returncode != 0:
             return f"'{' '.join(step)}' failed (see above); repair it, then run: {command}"
     still = missing_packages()
     return f"system libraries are still missing after the installation: {', '.join(still)}" if still else None

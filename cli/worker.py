@@ -4,8 +4,8 @@
 The parent never imports bpy. It starts the child with this module's ``prepare_child``, forwards interrupts, and turns a
 death by signal into one plain line. Three descriptors go to the child:
 
-* its standard output belongs to the command's result alone and its standard error to our own lines: whatever Blender prints,
-  from C or through ``sys.stdout``, goes to the log instead;
+* its standard output belongs to the command's result alone and its standard error to our own lines: whatever Blender
+  prints, from C or through ``sys.stdout``, goes to the log instead;
 * ``status``: the child writes the name of every milestone it has passed (see ``milestone``);
 * ``log``: an unnamed file that takes the C-level chatter, shown with --verbose or when the child dies.
 """
@@ -91,7 +91,7 @@ def leave(status: int) -> None:
 
 
 def run_in_child(argv: list[str], say, needs_gpu: bool, verbose: bool) -> tuple[int, int]:
-    """Runs ``argv`` in a child. Returns (exit status, process id of the child); ``say`` prints one line for the user."""
+    """Runs ``argv`` in a child. Returns (exit status, child's process id); ``say`` prints one line for the user."""
     problem = system_libraries.ensure(say)
     if problem:
         say(problem)
@@ -100,7 +100,7 @@ def run_in_child(argv: list[str], say, needs_gpu: bool, verbose: bool) -> tuple[
     alive_read, alive_write = os.pipe()
     with tempfile.TemporaryFile() as log:
         start = Path(__file__).with_name("__main__.py")
-        # Held back here and, by inheritance, in the child until each has its handler: none is lost, none is a traceback.
+        # Held back here and, inherited, in the child until each has its handler: none is lost, none is a traceback.
         signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
         # A process group of its own: Ctrl-C on a terminal reaches only this process, which forwards it exactly once.
         child = subprocess.Popen(

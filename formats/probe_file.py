@@ -10,9 +10,9 @@
     depth.mean.00 … .63         mean distance per octahedral texel, metres
     depth.meansq.00 … .63       mean squared distance, metres²
 
-The text attribute ``gridlight`` is one JSON object: what the channels cannot say (see ``describe``), and ``digest``, the SHA-256
-of that object without the digest and of all channel bytes, so a damaged file is noticed wherever the damage is. A file
-without ``digest`` is accepted: other programs may write one.
+The text attribute ``gridlight`` is one JSON object: what the channels cannot say (see ``describe``), and ``digest``, the
+SHA-256 of that object without the digest and of all channel bytes, so a damaged file is noticed wherever the damage is.
+A file without ``digest`` is accepted: other programs may write one.
 """
 
 from __future__ import annotations
@@ -92,8 +92,8 @@ def write(path, field: Field) -> None:
     names = channel_names(field.bands)
     finite = np.isfinite(planes).all(axis=(1, 2))
     if not finite.all():
-        raise InputError(f"{field.grid.name}: channel {names[int(np.argmin(finite))]} holds values that are not finite; "
-                         "nothing was written")
+        name = names[int(np.argmin(finite))]
+        raise InputError(f"{field.grid.name}: channel {name} holds values that are not finite; nothing was written")
     text = _json(describe(field))
     document = {**json.loads(text), "digest": _digest(text, planes)}
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, ATTRIBUTE: _json(document)}
@@ -131,7 +131,8 @@ def read(path) -> Field:
             planes = _gather(path, channels, grid, bands)
     except (RuntimeError, ValueError, TypeError, OverflowError, UnicodeDecodeError) as error:
         # What OpenEXR's binding raises for files that end early or contradict themselves.
-        raise InputError(f"{path} is truncated or damaged ({_reason(error)}); bake it again or restore a copy") from None
+        reason = _reason(error)
+        raise InputError(f"{path} is truncated or damaged ({reason}); bake it again or restore a copy") from None
     _check_values(path, document, planes, bands)
     return _field(document, grid, bands, planes)
 
@@ -186,7 +187,7 @@ def _check_header(path: str, header: dict) -> tuple[dict, Grid, int]:
     grid, bands = _announced_grid(path, document)
     size = _pixel_bytes(grid, bands)
     if size > MAX_BYTES:
-        raise InputError(f"{path} announces {size >> 20} MiB of probes, the limit is {MAX_BYTES >> 20} MiB; it is not read")
+        raise InputError(f"{path} announces {size >> 20} MiB of probes; the limit is {MAX_BYTES >> 20} MiB")
     low, high = (np.asarray(corner, np.int64) for corner in header["dataWindow"])
     nx, ny, nz = grid.resolution
     if tuple(high - low + 1) != (nx, ny * nz):
@@ -209,8 +210,8 @@ def _announced_grid(path: str, document: dict) -> tuple[Grid, int]:
         bands = document["bands"]
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(f"{path} is damaged: its description of the volume is incomplete ({_reason(error)})") from None
-    whole = all(type(number) is int for number in (*resolution, bands))
-    if matrix.shape != (4, 4) or len(resolution) != 3 or not whole or not 1 <= bands <= MAX_BANDS or not isinstance(name, str):
+    whole = all(type(number) is int for number in (*resolution, bands)) and 1 <= bands <= MAX_BANDS
+    if matrix.shape != (4, 4) or len(resolution) != 3 or not whole or not isinstance(name, str):
         raise InputError(f"{path} is damaged: its volume, resolution or bands make no sense")
     try:
         return Grid(matrix, resolution, name), bands

@@ -82,7 +82,7 @@ def missing_folders(folder) -> list[Path]:
 
 
 def remove_leftovers(folder, process: int, made: list[Path]) -> None:
-    """Removes from ``folder`` what process number ``process`` left there when it was killed, and the folders it ``made``."""
+    """Removes what process number ``process`` left in ``folder`` when it was killed, and the folders it ``made``."""
     for leftover in Path(folder).glob(f".*.{process}.part*"):
         leftover.unlink(missing_ok=True)
     _remove_empty(made)
