@@ -73,9 +73,6 @@ def test_room_seen_from_a_volume_inside_it(gpu_context, reference, walls):
     check(INSIDE, bake(scenes.cornell(walls), INSIDE), reference)
 
 
-@pytest.mark.parametrize("walls", [
-    pytest.param("thick", marks=pytest.mark.xfail(strict=True, reason="11 %: surfaces beyond the last free node are clamped to it")),
-    pytest.param("planes", marks=pytest.mark.xfail(strict=True, reason="60 %: probes behind the planes vote on their orientation")),
-    pytest.param("cube", marks=pytest.mark.xfail(strict=True, reason="97 %: probes outside the cube outvote those in the room"))])
+@pytest.mark.parametrize("walls", ["thick", "planes", "cube"])
 def test_room_seen_from_a_volume_that_reaches_into_its_walls(gpu_context, reference, walls):
     check(INTO_WALLS, bake(scenes.cornell(walls), INTO_WALLS), reference)

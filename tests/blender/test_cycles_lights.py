@@ -99,10 +99,7 @@ def check(scene, samples=16):
     assert error < TOLERANCE
 
 
-SCALED_CONE = pytest.mark.xfail(strict=True, reason="Cycles stretches the cone with the object, see docs/measurements.md")
-
-
-@pytest.mark.parametrize("name", [pytest.param(name, marks=SCALED_CONE if name == "spot, scaled" else ()) for name in LIGHTS])
+@pytest.mark.parametrize("name", LIGHTS)
 def test_light_on_a_wall(gpu_context, name):
     scene = wall_and_screen(name)
     scenes.add_light(scene, **LIGHTS[name])
