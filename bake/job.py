@@ -21,7 +21,7 @@ from ..core.conventions import ACTIVE, CULLED, DEPTH_EDGE, INVALID
 from ..core.errors import Cancelled, InputError
 from ..core.field import Field
 from ..core.grid import Grid
-from ..core.orientation import ShellVote
+from ..core.orientation import ShellVote, inside_solid
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..gpu_shaders.backend import GpuBackend, Surfaces
@@ -29,7 +29,6 @@ from ..gpu_shaders.scene_textures import SceneTextures
 from .capture_choice import choose_capture
 from .convergence import Convergence
 
-_INVALID_SHARE = 0.5  # of the sphere showing back faces
 
 
 class Reporter(Protocol):
@@ -123,7 +122,7 @@ def bake_steps(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, repo
         result.notes.append(f"{moved} probes in or behind walls were moved out, at most half a cell")
         shares = backend.read_shares()
     with _timed(result, "capture"):
-        state[nodes[shares[:, 0] > _INVALID_SHARE]] = INVALID
+        state[nodes[inside_solid(shares)]] = INVALID
         if not (state == ACTIVE).any():
             raise InputError(f"{grid.name}: every probe sits inside solid geometry; move or enlarge the volume")
         backend.set_states(state)
@@ -247,7 +246,7 @@ def _relocate(batches: _Batches, backend: GpuBackend, grid: Grid, nodes: np.ndar
 
     A probe that sees no light from its new place either goes back.
     """
-    candidates = np.flatnonzero(relocation.misplaced(shares, _INVALID_SHARE))
+    candidates = np.flatnonzero(relocation.misplaced(shares))
     if not len(candidates):
         return 0
     home = grid.positions()[nodes]
@@ -261,8 +260,8 @@ def _relocate(batches: _Batches, backend: GpuBackend, grid: Grid, nodes: np.ndar
     moved = np.flatnonzero(step.any(axis=1))
     for changed in (moved, None):
         if changed is None:  # second round: what saw no light goes home
-            dark = backend.read_shares()[moved]
-            changed = moved[(dark[:, 2] == 0) | (dark[:, 0] > _INVALID_SHARE)]
+            shares = backend.read_shares()[moved]
+            changed = moved[(shares[:, 2] == 0) | inside_solid(shares)]
             step[changed] = 0.0
         backend.set_probes(nodes, home + step)
         for index in range(batches.count):

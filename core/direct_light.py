@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .sampling import sample_r2
 from .snapshot import Light
 
 Visible = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
@@ -36,30 +35,19 @@ class LightSamples:
     irradiance: np.ndarray  # (N, 3) per unit cosine at the surface
 
 
-def irradiance(light: Light, points: np.ndarray, origins: np.ndarray, normals: np.ndarray, keys: np.ndarray, samples: int,
+def irradiance(light: Light, points: np.ndarray, origins: np.ndarray, normals: np.ndarray, u: np.ndarray,
                visible: Visible) -> np.ndarray:
-    """(N, 3) irradiance of ``light`` at ``points`` (N, 3) with unit ``normals`` (N, 3), world metres.
+    """(N, 3) irradiance of ``light`` at ``points`` (N, 3) with unit ``normals`` (N, 3), world metres, by one sample each.
 
-    Shadow rays start at ``origins`` (N, 3), the points stepped off their surface; ``keys`` (N, 3) uint32 pick the samples. A light
-    without extent takes one sample whatever ``samples`` says.
+    ``u`` (N, 2) in [0, 1) picks the place on the light; the mean over many is the irradiance, one is exact where the light has no
+    extent. Shadow rays start at ``origins`` (N, 3), the points stepped off their surface.
     """
-    total = np.zeros((len(points), 3))
-    count = 1 if is_sharp(light) else samples
-    for index in range(count):
-        sample = sample_light(light, points, sample_r2(keys, index).astype(float))
-        cosine = np.einsum("ni,ni->n", sample.directions, normals)
-        lit = (cosine > 0) & sample.irradiance.any(axis=1)
-        if light.casts_shadow:
-            lit[lit] = visible(origins[lit], sample.directions[lit], sample.distances[lit] * _SHADOW_END)
-        total += np.where(lit, cosine, 0.0)[:, None] * sample.irradiance
-    return total / count
-
-
-def is_sharp(light: Light) -> bool:
-    """Is one sample exact, because the light has no extent?"""
-    if light.kind == "SUN":
-        return light.angle == 0
-    return light.kind != "AREA" and light.radius == 0
+    sample = sample_light(light, points, u)
+    cosine = np.einsum("ni,ni->n", sample.directions, normals)
+    lit = (cosine > 0) & sample.irradiance.any(axis=1)
+    if light.casts_shadow:
+        lit[lit] = visible(origins[lit], sample.directions[lit], sample.distances[lit] * _SHADOW_END)
+    return np.where(lit, cosine, 0.0)[:, None] * sample.irradiance
 
 
 def sample_light(light: Light, points: np.ndarray, u: np.ndarray) -> LightSamples:
@@ -150,12 +138,13 @@ def _sample_point(light: Light, points: np.ndarray, u: np.ndarray) -> LightSampl
 def spot_mask(light: Light, directions: np.ndarray) -> np.ndarray:
     """(N,) share of a spot's light sent against ``directions`` (N, 3): smoothstep in the cosine, 1 inside, 0 outside the cone.
 
-    The cone lives in the object's own frame, so a scaled object stretches it (Cycles, ``spot_light_attenuation``).
+    The cone lives in the object's own frame, so the object's scale stretches it.
     """
-    local = directions @ np.asarray(light.matrix, float)[:3, :3] / np.asarray(light.spot_scale)
-    local /= np.linalg.norm(local, axis=1, keepdims=True)
     cosine = np.cos(light.spot_size / 2)
     width = max((1 - cosine) * light.spot_blend, _LEAST_BLEND)
+    scale = np.asarray(light.spot_scale, float)
+    local = directions @ np.asarray(light.matrix, float)[:3, :3] * (scale[2] / scale)
+    local /= np.linalg.norm(local, axis=1, keepdims=True)
     x = np.clip((local[:, 2] - cosine) / width, 0, 1)
     return x * x * (3 - 2 * x)
 

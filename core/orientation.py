@@ -11,7 +11,17 @@ from __future__ import annotations
 import numpy as np
 
 _LIT_SHARE = 0.1  # of the back faces seen: less is a light leak
+_MOST = 0.5  # of the sphere
 _OPEN_SHARE = 0.01  # of a probe's directions that see background: the inside of a solid sees none
+
+
+def inside_solid(shares: np.ndarray) -> np.ndarray:
+    """(S,) bool of probes that are invalid, from shares (S, 4) of the sphere: back faces of solids, background, lit, all back faces.
+
+    Most of what such a probe sees are back faces of solids; or back faces of anything, and neither light nor the world.
+    """
+    solid, background, lit, behind = shares.T
+    return (solid > _MOST) | ((behind > _MOST) & (background == 0) & (lit == 0))
 
 
 def flipped_objects(sightings: np.ndarray, object_count: int) -> np.ndarray:
@@ -34,6 +44,7 @@ class ShellVote:
     def __init__(self, object_count: int):
         self._behind = np.zeros(object_count)
         self._lit = np.zeros(object_count)
+        self._any_light = False
 
     def add(self, sightings: np.ndarray) -> None:
         """``sightings`` (P, S): per probe ±(object + 1) of S directions, negative from behind, half a unit farther from zero where
@@ -41,11 +52,14 @@ class ShellVote:
         size = np.abs(sightings)
         behind = sightings < 0
         item = np.floor(size).astype(np.int64) - 1
+        self._any_light |= bool(((size > item + 1.25) | (sightings == 0)).any())
         open_ = (sightings == 0).mean(axis=1) >= _OPEN_SHARE
         lit = behind & ((size > item + 1.25) | open_[:, None])
         self._behind += np.bincount(item[behind], minlength=len(self._behind))
         self._lit += np.bincount(item[lit], minlength=len(self._lit))
 
     def shells(self) -> np.ndarray:
-        """(object_count,) bool."""
+        """(object_count,) bool. In the dark nothing tells a room from a solid: all count as shells."""
+        if not self._any_light:
+            return np.ones(len(self._lit), bool)
         return (self._lit > 0) & (self._lit >= _LIT_SHARE * self._behind)

@@ -18,13 +18,13 @@ import numpy as np
 from . import culling, dilation, lookup, rays
 from . import spherical_harmonics as sh
 from .conventions import ACTIVE, CULLED, DEPTH_EDGE, INVALID
-from .cubemap import direction_to_texel, octahedral_decode, texel_directions, texel_solid_angles
+from .cubemap import direction_to_texel, octahedral_decode, texel_directions, texel_place_directions, texel_solid_angles
 from .direct_light import irradiance as light_irradiance
 from .field import Field
 from .grid import Grid
 from .images import sample_image
-from .orientation import flipped_objects
-from .sampling import light_keys
+from .orientation import ShellVote
+from .sampling import PLACE_STREAM, light_stream, sample_r2, texel_keys
 from .settings import BakeSettings
 from .snapshot import NO_IMAGE, SceneSnapshot
 from .world_map import world_texels
@@ -48,10 +48,11 @@ class TexelSurfaces:
 class ReferenceBake:
     """One bake of ``snapshot`` into ``grid``, stage by stage, so that tests can compare each with the GPU's.
 
-    ``nodes`` (S,) are the grid nodes that capture; ``capture`` comes first, then ``field_statistics``, ``source`` and ``iterate``.
+    ``nodes`` (S,) are the grid nodes that capture; ``capture`` comes first, then ``source``, ``field_statistics`` and ``iterate``.
+    ``offset`` (grid.count, 3) metres are moves of probes out of walls, which the reference takes as given (core/relocation.py).
     """
 
-    def __init__(self, snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings):
+    def __init__(self, snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, offset: np.ndarray | None = None):
         self.snapshot, self.grid, self.settings = snapshot, grid, settings
         self.triangles = snapshot.triangle_positions - grid.center
         self.directions = texel_directions(settings.face).reshape(-1, 3)
@@ -59,7 +60,8 @@ class ReferenceBake:
         needed = settings.keep_all or culling.needed_nodes(grid, snapshot.triangle_positions)
         self.state = np.where(np.broadcast_to(needed, grid.count), ACTIVE, CULLED).astype(np.uint8)
         self.nodes = np.flatnonzero(self.state == ACTIVE)
-        self.positions = grid.positions()[self.nodes] - grid.center
+        self.offset = np.zeros((grid.count, 3)) if offset is None else np.asarray(offset, float)
+        self.positions = (grid.positions() + self.offset)[self.nodes] - grid.center
         clips = np.array([material.alpha_threshold > 0 for material in snapshot.materials])
         self._clipped = clips[snapshot.material_index]
 
@@ -133,19 +135,21 @@ class ReferenceBake:
 
     # Statistics -------------------------------------------------------------------------------------------------------------
 
-    def flipped_objects(self, surfaces: TexelSurfaces) -> np.ndarray:
-        """(objects,) bool: the vote of all probes on 8×8 texels of each face, see core/orientation.py."""
+    def shells(self, surfaces: TexelSurfaces, source: np.ndarray) -> np.ndarray:
+        """(objects,) bool: whose back faces are not the inside of a solid, by 8×8 texels of each face, see core/orientation.py."""
         face = self.settings.face
         at = (2 * np.arange(8) + 1) * face // 16
-        index = (np.arange(6)[:, None, None] * face + at[:, None]) * face + at
-        triangle = surfaces.triangle[:, index.ravel()]
-        seen = self.snapshot.object_index[triangle] + 1
-        sightings = np.where(triangle < 0, 0, np.where(surfaces.back[:, index.ravel()], -seen, seen))
-        return flipped_objects(sightings, max(len(self.snapshot.object_names), 1))
+        index = ((np.arange(6)[:, None, None] * face + at[:, None]) * face + at).ravel()
+        triangle = surfaces.triangle[:, index]
+        lit = surfaces.emission[:, index].any(axis=2) | source[:, index].any(axis=2)
+        seen = self.snapshot.object_index[triangle] + 1 + 0.5 * lit
+        vote = ShellVote(max(len(self.snapshot.object_names), 1))
+        vote.add(np.where(triangle < 0, 0.0, np.where(surfaces.back[:, index], -seen, seen)))
+        return vote.shells()
 
-    def back_face_share(self, surfaces: TexelSurfaces, flips: np.ndarray) -> np.ndarray:
-        """(P,) share of the sphere that shows back faces, objects in ``flips`` turned round."""
-        back = surfaces.back ^ flips[self.snapshot.object_index[surfaces.triangle]]
+    def back_face_share(self, surfaces: TexelSurfaces, shells: np.ndarray) -> np.ndarray:
+        """(P,) share of the sphere that shows back faces of other objects than ``shells``."""
+        back = surfaces.back & ~shells[self.snapshot.object_index[surfaces.triangle]]
         return (back & (surfaces.triangle >= 0)) @ self.solid_angles / (4 * np.pi)
 
     def depth_moments(self, surfaces: TexelSurfaces) -> np.ndarray:
@@ -163,14 +167,15 @@ class ReferenceBake:
         distance = np.minimum(surfaces.distance[:, texel], lookup.depth_clamp(self.grid))
         return np.stack([distance.mean(axis=-1), (distance**2).mean(axis=-1)], axis=-1)
 
-    def field_statistics(self, surfaces: TexelSurfaces) -> Field:
+    def field_statistics(self, surfaces: TexelSurfaces, source: np.ndarray) -> Field:
         """A dark field with states, validity and depth."""
-        share = self.back_face_share(surfaces, self.flipped_objects(surfaces))
+        share = self.back_face_share(surfaces, self.shells(surfaces, source))
         field = Field.empty(self.grid, self.settings.bands)
         field.state[:] = self.state
         field.state[self.nodes[share > INVALID_SHARE]] = INVALID
         field.validity[self.nodes] = 1 - share
         field.depth[self.nodes] = self.depth_moments(surfaces)
+        field.offset[:] = self.offset
         return field
 
     # Light ------------------------------------------------------------------------------------------------------------------
@@ -181,23 +186,37 @@ class ReferenceBake:
         return self.positions[:, None] + self.directions * distance[..., None]
 
     def source(self, surfaces: TexelSurfaces) -> np.ndarray:
-        """(P, X, 3) emission plus reflected direct light of all lights."""
+        """(P, X, 3) emission plus reflected direct light of all lights, each sample at another place of the texel's footprint."""
         probe, texel = np.nonzero((surfaces.triangle >= 0) & surfaces.albedo.any(axis=2))
-        points = self.points(surfaces)[probe, texel]
         normals = surfaces.normal[probe, texel]
-        origins = rays.step_off(points, normals, -self.directions[texel], surfaces.distance[probe, texel])
-
-        def visible(starts, directions, limits):
-            return ~rays.any_hit(self.triangles, starts, directions, limits, self._hole_test())
-
-        incoming = np.zeros((len(points), 3))
-        for index, light in enumerate(self.snapshot.lights):
-            keys = light_keys(self.nodes[probe], texel, index, self.settings.seed)
-            centre = self.grid.center
-            incoming += light_irradiance(light, points + centre, origins, normals, keys, self.settings.samples, visible)
+        incoming = np.zeros((len(probe), 3))
+        for index in range(self.settings.samples):
+            directions, distances = self._look_at_place(surfaces, probe, texel, index)
+            points = self.positions[probe] + directions * distances[:, None]
+            origins = rays.step_off(points, normals, -directions, distances)
+            for number, light in enumerate(self.snapshot.lights):
+                u = sample_r2(texel_keys(self.nodes[probe], texel, light_stream(number), self.settings.seed), index)
+                incoming += light_irradiance(light, points + self.grid.center, origins, normals, u.astype(float), self._visible)
         source = surfaces.emission.copy()
-        source[probe, texel] += surfaces.albedo[probe, texel] / np.pi * incoming
+        source[probe, texel] += surfaces.albedo[probe, texel] / np.pi * incoming / self.settings.samples
         return source
+
+    def _look_at_place(self, surfaces: TexelSurfaces, probe: np.ndarray, texel: np.ndarray, index: int):
+        """Directions (N, 3) and distances (N,) of sample ``index`` on the planes of the texels' surfaces; the centre where a single
+        sample is taken or the plane is seen edge-on."""
+        centre, distance = self.directions[texel], surfaces.distance[probe, texel]
+        if self.settings.samples == 1:
+            return centre, distance
+        place = sample_r2(texel_keys(self.nodes[probe], texel, PLACE_STREAM, self.settings.seed), index).astype(float)
+        moved = texel_place_directions(texel, place, self.settings.face)
+        normals = surfaces.normal[probe, texel]
+        with np.errstate(divide="ignore"):
+            moved_distance = distance * np.einsum("ni,ni->n", centre, normals) / np.einsum("ni,ni->n", moved, normals)
+        usable = (moved_distance > 0.5 * distance) & (moved_distance < 2 * distance)
+        return np.where(usable[:, None], moved, centre), np.where(usable, moved_distance, distance)
+
+    def _visible(self, origins: np.ndarray, directions: np.ndarray, limits: np.ndarray) -> np.ndarray:
+        return ~rays.any_hit(self.triangles, origins, directions, limits, self._hole_test())
 
     def lookups(self, surfaces: TexelSurfaces, field: Field) -> tuple[np.ndarray, np.ndarray]:
         """Nodes (P, X, 8) and weights (P, X, 8) with which each texel's surface reads the field."""
@@ -224,12 +243,12 @@ class ReferenceBake:
         return coefficients[dilation.nearest_active(self.grid, active)]
 
 
-def bake(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings) -> Field:
+def bake(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, offset: np.ndarray | None = None) -> Field:
     """The field after ``settings.bounces`` bounces, which must be given: the reference does not judge convergence."""
-    job = ReferenceBake(snapshot, grid, settings)
+    job = ReferenceBake(snapshot, grid, settings, offset)
     surfaces = job.capture()
-    field = job.field_statistics(surfaces)
     source = job.source(surfaces)
+    field = job.field_statistics(surfaces, source)
     lookups = job.lookups(surfaces, field)
     field.coefficients = np.zeros((grid.count, settings.bands**2, 3))
     for _ in range(settings.bounces + 1):

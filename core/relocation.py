@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from .grid import Grid
+from .orientation import inside_solid
 
 _LEAST_BEHIND = 0.25  # share of back faces, or of background, in sight of a probe that stands in or behind a wall
 _REACH = 0.5  # cells
@@ -18,10 +19,10 @@ _MARGIN = 0.05  # cells between a moved probe and the surface it came through
 _OUTWARD_PENALTY = 0.5  # how much farther than inwards the way out of the volume counts
 
 
-def misplaced(shares: np.ndarray, invalid_share: float) -> np.ndarray:
+def misplaced(shares: np.ndarray) -> np.ndarray:
     """(S,) bool of probes worth moving, from shares (S, 4) of back faces of solids, background, lit and all back faces."""
     dark = shares[:, 2] == 0
-    return (shares[:, 0] > invalid_share) | (dark & (np.maximum(shares[:, 1], shares[:, 3]) > _LEAST_BEHIND))
+    return inside_solid(shares) | (dark & (np.maximum(shares[:, 1], shares[:, 3]) > _LEAST_BEHIND))
 
 
 def moves(grid: Grid, positions: np.ndarray, exits: np.ndarray) -> np.ndarray:

@@ -41,11 +41,19 @@ def sample_r2(keys: np.ndarray, index: int) -> np.ndarray:
     return (place >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
 
 
-def light_keys(nodes: np.ndarray, texels: np.ndarray, light: int, seed: int) -> np.ndarray:
-    """(…, 3) uint32 keys of the samples that texels (…) of probes at grid ``nodes`` (…) take of light number ``light``.
+def texel_keys(nodes: np.ndarray, texels: np.ndarray, stream: int, seed: int) -> np.ndarray:
+    """(…, 3) uint32 keys of the samples that texels (…) of probes at grid ``nodes`` (…) take for one purpose, ``stream``.
 
-    ``texels`` count face by face, row by row. The odd factor keeps light numbers apart for any seed.
+    ``texels`` count face by face, row by row.
     """
-    last = np.uint32((light * 0x9E3779B9 + seed) & 0xFFFFFFFF)
+    last = np.uint32((stream + seed) & 0xFFFFFFFF)
     nodes, texels = np.broadcast_arrays(np.asarray(nodes, np.uint32), np.asarray(texels, np.uint32))
     return np.stack([nodes, texels, np.full_like(nodes, last)], axis=-1)
+
+
+PLACE_STREAM = 0x632BE5AB  # where in its footprint a texel looks
+
+
+def light_stream(light: int) -> int:
+    """Where on light number ``light`` a shadow ray goes; the odd factor keeps lights apart for any seed."""
+    return light * 0x9E3779B9

@@ -6,11 +6,16 @@
  * writes `source`.
  */
 
-/* Distance along `direction` of the plane through the texel's surface; the centre's where the plane is seen edge-on. */
-float plane_distance(vec3 centre_direction, float distance, vec3 normal, vec3 direction)
+/* Moves a view through a texel to `place` (0..1) of it: direction and distance of the plane of the centre's surface. Stays at the centre
+ * where the plane is seen edge-on. */
+void look_at_place(ivec2 texel, vec2 place, vec3 normal, inout vec3 direction, inout float distance)
 {
-  float range = distance * dot(centre_direction, normal) / dot(direction, normal);
-  return range > 0.5 * distance && range < 2.0 * distance ? range : distance;
+  vec3 moved = texel_place_direction(texel, place);
+  float range = distance * dot(direction, normal) / dot(moved, normal);
+  if (range > 0.5 * distance && range < 2.0 * distance) {
+    direction = moved;
+    distance = range;
+  }
 }
 
 void main()
@@ -32,8 +37,9 @@ void main()
     vec3 irradiance = vec3(0.0);
     for (int i = 0; i < samples; i++) {
       vec2 place = samples == 1 ? vec2(0.5) : sample_r2(key + uvec3(0u, 0u, 0x632BE5ABu), i);
-      vec3 direction = texel_place_direction(id.xy, place);
-      float range = plane_distance(centre_direction, abs(seen.z), normal, direction);
+      vec3 direction = centre_direction;
+      float range = abs(seen.z);
+      look_at_place(id.xy, place, normal, direction, range);
       vec3 point = probe.xyz + direction * range;
       vec3 origin = step_off(point, normal, -direction, range);
       irradiance += lamps_irradiance(point, origin, normal, key, i);

@@ -85,6 +85,8 @@ def all_lights():
         "point sphere": Light("point sphere", "POINT", color, frame((-0.5, 0.4, 0.66)), radius=0.15, soft_falloff=False),
         "spot": Light("spot", "SPOT", color, frame((0.5, 0.4, 0.8), (-0.3, -0.2, -1)), spot_size=1.2, spot_blend=0.4),
         "spot soft": Light("spot soft", "SPOT", color, frame((0.5, -0.4, 0.8), (-0.3, 0.2, -1)), spot_size=1.0, spot_blend=0.2, radius=0.1),
+        "spot scaled": Light("spot scaled", "SPOT", color, frame((0.5, -0.4, 0.8), (-0.3, 0.2, -1)), spot_size=1.0, spot_blend=0.2,
+                             spot_scale=(1.0, 2.0, 1.5)),
         "sun": Light("sun", "SUN", color, frame(towards=(0.3, 0.4, -0.8))),
         "sun wide": Light("sun wide", "SUN", color, frame(towards=(-0.3, 0.4, -0.8)), angle=0.3),
         "rectangle": Light("rectangle", "AREA", color, frame((0.1, 0.2, 0.9), (0.1, 0, -1)), size_x=0.5, size_y=0.3),

@@ -2,9 +2,10 @@
 """One bake taken apart: every stage on the GPU, read back, beside the reference fed with what the GPU had before that stage."""
 
 import numpy as np
+from gridlight.core.conventions import INVALID
 from gridlight.core.cubemap import octahedral_decode
 from gridlight.core.field import Field
-from gridlight.core.reference_bake import ReferenceBake, TexelSurfaces
+from gridlight.core.reference_bake import INVALID_SHARE, ReferenceBake, TexelSurfaces
 from gridlight.gpu_shaders.backend import GpuBackend
 from shader_runner import read_layers
 
@@ -53,12 +54,12 @@ class Stages:
     def statistics(self):
         """The GPU's states and depth as a field without light."""
         backend, nodes = self.backend, self.reference.nodes
-        backend.set_flips(self.reference.flipped_objects(self.surfaces()))
+        backend.set_shells(self.reference.shells(self.surfaces(), self.source()))
         backend.statistics(self.gpu)
         shares = backend.read_shares()
         field = Field.empty(self.grid, self.settings.bands)
         field.state[:] = self.reference.state
-        field.state[nodes[shares[:, 0] > 0.5]] = 2
+        field.state[nodes[shares[:, 0] > INVALID_SHARE]] = INVALID
         field.validity[nodes] = 1 - shares[:, 0]
         field.depth[nodes] = backend.read_depth()
         backend.set_states(field.state)

@@ -82,7 +82,7 @@ def floor_stages(light, **settings):
     """A large white floor one metre below one probe; no bounce."""
     floor = [[[-50, -50, -1], [50, -50, -1], [50, 50, -1]], [[-50, -50, -1], [50, 50, -1], [-50, 50, -1]]]
     snapshot = snapshot_of(floor, materials=[Material("white", (1.0, 1.0, 1.0))], lights=[light])
-    return Stages(snapshot, Grid.from_bounds([-0.1] * 3, [0.1] * 3, (1, 1, 1)), BakeSettings(keep_all=True, **settings))
+    return Stages(snapshot, Grid.from_bounds([-0.1] * 3, [0.1] * 3, (1, 1, 1)), BakeSettings(keep_all=True, **{"samples": 1, **settings}))
 
 
 def floor_texels(stages):
@@ -105,14 +105,15 @@ def test_point_light_above_a_plane():
 @pytest.mark.parametrize("angle", [0.0, 0.00918, 0.5])
 def test_sun_above_a_plane(angle):
     light = Light("sun", "SUN", (3.0, 3.0, 3.0), frame(towards=(0.6, 0, -0.8)), angle=angle)
-    _points, found = floor_texels(floor_stages(light, samples=256 if angle else 1))
+    _points, found = floor_texels(floor_stages(light, samples=256 if angle else 1, face=16))
     np.testing.assert_allclose(found, 3 * 0.8, rtol=1e-5 if angle == 0 else 5e-3)
 
 
 def test_area_light_above_a_plane_against_its_form_factor():
     """E = π L F of the floor below a parallel rectangle: four rectangles with a corner above the point (Howell, B-4), with sign."""
     light = Light("panel", "AREA", (2.0, 2.0, 2.0), np.eye(4) + np.outer([0, 0, 2, 0], [0, 0, 0, 1]), size_x=2.0, size_y=1.0)
-    points, found = floor_texels(floor_stages(light, samples=1024))
+    # samples are spread over a texel's footprint as well as over the light: texels must be small to stand for their centres
+    points, found = floor_texels(floor_stages(light, samples=512, face=64))
 
     def corner(width, depth, height=3.0):
         a, b = width / height, depth / height
@@ -121,7 +122,8 @@ def test_area_light_above_a_plane_against_its_form_factor():
 
     x, y = points[:, 0], points[:, 1]
     factor = sum(corner(1.0 + sx * x, 0.5 + sy * y) for sx in (-1, 1) for sy in (-1, 1))
-    np.testing.assert_allclose(found, np.tile(2 * np.pi * factor[:, None], 3), rtol=4e-3)
+    np.testing.assert_allclose(found, np.tile(2 * np.pi * factor[:, None], 3), rtol=1e-2)
+    np.testing.assert_allclose(found.sum(axis=0), 2 * np.pi * factor.sum(), rtol=1e-3)
 
 
 def ground(size, rotation=np.eye(3)):
@@ -139,7 +141,7 @@ def test_a_ground_plane_does_not_shadow_itself(size, slanted, capture):
     rotation *= np.linalg.det(rotation)
     sun = Light("sun", "SUN", (3.0, 3.0, 3.0), frame(towards=rotation @ [0.6, 0, -0.8]))
     snapshot = snapshot_of(ground(size, rotation), materials=[Material("white", (1.0, 1.0, 1.0))], lights=[sun])
-    stages = Stages(snapshot, Grid.from_bounds([-0.1] * 3, [0.1] * 3, (1, 1, 1)), BakeSettings(keep_all=True), capture)
+    stages = Stages(snapshot, Grid.from_bounds([-0.1] * 3, [0.1] * 3, (1, 1, 1)), BakeSettings(keep_all=True, samples=4), capture)
     hit = stages.surfaces().triangle[0] >= 0
     assert hit.sum() > 500
     assert (np.abs(stages.source()[0][hit] * np.pi / 2.4 - 1).max(axis=1) < 1e-4).mean() > 0.995

@@ -147,19 +147,17 @@ def test_direct_light(name):
     points, normals = points_in_the_room()
     blocker = np.array([[[-0.5, -0.5, 0.45], [0.6, -0.4, 0.5], [0.0, 0.7, 0.55]]], np.float32)
     scene = RayScene(blocker)
-    nodes, texels, samples = np.arange(4000) % 100, np.arange(4000) // 100, 5
-    keys = sampling.light_keys(nodes, texels, 3, 11)
-    packed = np.concatenate([keys[:, :2].astype(float), halves(keys[:, 2])], axis=1)
+    places = np.random.default_rng(6).random((4000, 2)).astype(np.float32)
     lamp = textures.upload(scene_textures.pack_lights([light], ORIGIN), "lights")
     found = run("lights", 4000, libraries=["data_lib", "random_lib", "ray_lib", "direct_light_lib"],
-                inputs={"points": points, "normals": normals, "keys": packed}, textures_2d={**scene.textures, "lights": lamp},
-                ints={"samples": samples}, defines=scene.defines)[:, :3]
+                inputs={"points": points, "normals": normals, "places": places}, textures_2d={**scene.textures, "lights": lamp},
+                defines={**scene.defines, "light_count": 1})[:, :3]
 
     def visible(origins, directions, limits):
         return ~rays.any_hit(blocker.astype(float), origins, directions, limits)
 
     points, normals = points.astype(float), normals.astype(float)
-    expected = direct_light.irradiance(light, points, points, normals, keys, samples, visible)
+    expected = direct_light.irradiance(light, points, points, normals, places.astype(float), visible)
     assert (expected.any(axis=1)).mean() > 0.05
     # Beside an edge of a shadow, a cone or the horizon float32 decides otherwise for single samples; elsewhere 1e-5 of the
     # brightest, or of the value where it is larger: soft edges and cosines near zero lose relative precision.

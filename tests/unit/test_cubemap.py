@@ -53,6 +53,16 @@ def test_texels_and_directions_are_inverses(face):
         np.testing.assert_array_equal(found, index)
 
 
+def test_places_of_texels():
+    centres = cubemap.texel_place_directions(np.arange(6 * 25), np.full((150, 2), 0.5), 5)
+    np.testing.assert_allclose(centres, cubemap.texel_directions(5).reshape(-1, 3), atol=1e-15)
+    inside = np.random.default_rng(0).uniform(0.01, 0.99, (150, 2))
+    face, row, column = cubemap.direction_to_texel(cubemap.texel_place_directions(np.arange(150), inside, 5), 5)
+    np.testing.assert_array_equal((face * 5 + row) * 5 + column, np.arange(150))
+    right = cubemap.texel_place_directions(np.array([0]), np.array([[1.0, 0.5]]), 1)
+    np.testing.assert_allclose(right, [[np.sqrt(0.5), -np.sqrt(0.5), 0]], atol=1e-15)
+
+
 @given(component, component, component)
 def test_a_direction_lies_in_its_texel(x, y, z):
     direction = np.array([x, y, z])

@@ -2,7 +2,7 @@
 """The vote on objects whose normals point the wrong way."""
 
 import numpy as np
-from gridlight.core.orientation import flipped_objects
+from gridlight.core.orientation import ShellVote, flipped_objects
 
 
 def test_an_object_seen_from_behind_by_most_probes_is_flipped():
@@ -31,3 +31,27 @@ def test_many_objects_and_probes():
     which = generator.integers(0, 50, (200, 64))
     sightings = np.where(inside_out[which], -1, 1) * (which + 1)
     np.testing.assert_array_equal(flipped_objects(sightings, 50), inside_out)
+
+
+def shells(sightings, count):
+    vote = ShellVote(count)
+    for part in np.array_split(np.asarray(sightings, float), 2):
+        vote.add(part)
+    return vote.shells()
+
+
+def test_lit_back_faces_are_shells_and_dark_ones_solids():
+    # object 0: seen from behind and lit; object 1: from behind in the dark; object 2: from the front
+    np.testing.assert_array_equal(shells([[-1.5] * 4, [-2.0] * 4, [3.5] * 4], 3), [True, False, False])
+
+
+def test_back_faces_beside_a_view_outside_are_shells():
+    np.testing.assert_array_equal(shells([[-1.0, -1, 0, 0], [-2.0, -2, -2, -2]], 2), [True, False])
+
+
+def test_a_light_leak_makes_no_shell():
+    assert not shells([[-1.5] + [-1.0] * 99, [-1.0] * 100], 1)[0]
+
+
+def test_in_the_dark_rooms_are_not_taken_for_solids():
+    assert shells([[-1.0] * 8, [2.0] * 8], 2).all()

@@ -60,7 +60,7 @@ def test_a_point_light_in_a_room_by_hand():
     matrix = np.eye(4)
     matrix[:3, 3] = position
     snapshot = room(Material("m", (0.5, 0.25, 1.0)), [Light("lamp", "POINT", (1.0, 1.0, 2.0), matrix)])
-    job = ReferenceBake(snapshot, GRID, BakeSettings(face=6))
+    job = ReferenceBake(snapshot, GRID, BakeSettings(face=6, samples=1))
     surfaces = job.capture()
     points = job.points(surfaces)
     assert np.abs(points).max(axis=2) == pytest.approx(1, rel=1e-12), "every texel sees a wall"
@@ -96,10 +96,12 @@ def test_probes_in_a_solid_are_invalid():
     both = SceneSnapshot(
         np.concatenate([outer.vertices, inner.vertices]), np.concatenate([outer.triangles, inner.triangles + 8]),
         np.concatenate([outer.corner_normals, inner.corner_normals]), np.concatenate([outer.corner_uvs, inner.corner_uvs]),
-        np.zeros(24, np.int32), np.repeat([0, 1], 12).astype(np.int32), ["room", "box"], [Material("m")], [], [], World((1, 1, 1)))
+        np.zeros(24, np.int32), np.repeat([0, 1], 12).astype(np.int32), ["room", "box"], [Material("m")], [],
+        [Light("lamp", "POINT", (1.0, 1.0, 1.0), np.eye(4) + np.outer([0.5, 0.6, 0.7, 0], [0, 0, 0, 1]))], World())
     grid = Grid.from_bounds([-0.8] * 3, [0.8] * 3, (3, 3, 3))
     job = ReferenceBake(both, grid, BakeSettings(face=8))
     surfaces = job.capture()
-    assert not job.flipped_objects(surfaces).any()
-    state = job.field_statistics(surfaces).state
+    source = job.source(surfaces)
+    assert not job.shells(surfaces, source).any()
+    state = job.field_statistics(surfaces, source).state
     assert state[13] == 2 and (np.delete(state, 13) == 1).all()

@@ -8,7 +8,7 @@ from gridlight.core.panorama import panorama_directions, panorama_solid_angles
 from gridlight.core.snapshot import World
 from gridlight.core.world_map import world_texels
 
-FACES = (4, 7, 16, 64)
+FACES = (4, 7, 16, 32)
 
 
 def energy(texels):
@@ -23,7 +23,7 @@ def test_one_colour_fills_every_texel(face):
 
 
 @pytest.mark.parametrize("face", FACES)
-@pytest.mark.parametrize("size", [(2, 1), (3, 64), (64, 32), (256, 128)])
+@pytest.mark.parametrize("size", [(2, 1), (3, 24), (64, 32), (256, 128)])
 def test_a_uniform_map_is_uniform(face, size):
     texels = world_texels(World(map=np.full((size[1], size[0], 3), 0.5, np.float32)), face)
     np.testing.assert_allclose(texels, 0.5, rtol=1e-12)

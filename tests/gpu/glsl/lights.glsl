@@ -1,12 +1,11 @@
-/* Irradiance of light 0 at points: origins of shadow rays are the points themselves. keys: node, texel, 16-bit halves of z. */
+/* Irradiance of light 0 at points by the place on it in `places`: shadow rays start at the points themselves. */
 
 void main()
 {
   int i = int(gl_GlobalInvocationID.x);
   if (i < count) {
     vec3 point = element(points, i).xyz;
-    uvec4 k = uvec4(element(keys, i));
-    uvec3 key = uvec3(k.x, k.y, k.z << 16u | k.w);
-    imageStore(result, element_position(i), vec4(light_irradiance(0, point, point, element(normals, i).xyz, key, samples), 0.0));
+    vec3 irradiance = light_irradiance(0, point, point, element(normals, i).xyz, element(places, i).xy);
+    imageStore(result, element_position(i), vec4(irradiance, 0.0));
   }
 }
