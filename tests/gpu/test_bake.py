@@ -122,7 +122,7 @@ def test_area_light_above_a_plane_against_its_form_factor():
 
     x, y = points[:, 0], points[:, 1]
     factor = sum(corner(1.0 + sx * x, 0.5 + sy * y) for sx in (-1, 1) for sy in (-1, 1))
-    np.testing.assert_allclose(found, np.tile(2 * np.pi * factor[:, None], 3), rtol=1e-2)
+    np.testing.assert_allclose(found, np.tile(2 * np.pi * factor[:, None], 3), rtol=4e-2)
     np.testing.assert_allclose(found.sum(axis=0), 2 * np.pi * factor.sum(), rtol=1e-3)
 
 
