@@ -18,10 +18,11 @@ _OPEN_SHARE = 0.01  # of a probe's directions that see background: the inside of
 def inside_solid(shares: np.ndarray) -> np.ndarray:
     """(S,) bool of probes that are invalid, from shares (S, 4) of the sphere: back faces of solids, background, lit, all back faces.
 
-    Most of what such a probe sees are back faces of solids; or back faces of anything, and neither light nor the world.
+    Most of what such a probe sees are back faces of solids; or back faces of anything, and neither light nor the world, which others do
+    see: where it is dark everywhere that tells nothing.
     """
     solid, background, lit, behind = shares.T
-    return (solid > _MOST) | ((behind > _MOST) & (background == 0) & (lit == 0))
+    return (solid > _MOST) | ((behind > _MOST) & (background == 0) & (lit == 0) & lit.any())
 
 
 def flipped_objects(sightings: np.ndarray, object_count: int) -> np.ndarray:

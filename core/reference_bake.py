@@ -23,13 +23,11 @@ from .direct_light import irradiance as light_irradiance
 from .field import Field
 from .grid import Grid
 from .images import sample_image
-from .orientation import ShellVote
+from .orientation import ShellVote, inside_solid
 from .sampling import PLACE_STREAM, light_stream, sample_r2, texel_keys
 from .settings import BakeSettings
 from .snapshot import NO_IMAGE, SceneSnapshot
 from .world_map import world_texels
-
-INVALID_SHARE = 0.5  # of the sphere showing back faces
 
 
 @dataclass
@@ -147,10 +145,13 @@ class ReferenceBake:
         vote.add(np.where(triangle < 0, 0.0, np.where(surfaces.back[:, index], -seen, seen)))
         return vote.shells()
 
-    def back_face_share(self, surfaces: TexelSurfaces, shells: np.ndarray) -> np.ndarray:
-        """(P,) share of the sphere that shows back faces of other objects than ``shells``."""
-        back = surfaces.back & ~shells[self.snapshot.object_index[surfaces.triangle]]
-        return (back & (surfaces.triangle >= 0)) @ self.solid_angles / (4 * np.pi)
+    def shares(self, surfaces: TexelSurfaces, source: np.ndarray) -> np.ndarray:
+        """(P, 4) shares of the sphere: back faces of solids, background, anything that sends light, all back faces."""
+        background = surfaces.triangle < 0
+        back = surfaces.back & ~background
+        solid = back & ~self.shells(surfaces, source)[self.snapshot.object_index[surfaces.triangle]]
+        lit = surfaces.emission.any(axis=2) | source.any(axis=2)
+        return np.stack([seen @ self.solid_angles for seen in (solid, background, lit, back)], axis=1) / (4 * np.pi)
 
     def depth_moments(self, surfaces: TexelSurfaces) -> np.ndarray:
         """(P, DEPTH_EDGE², 2) mean and mean square of clamped distance, 16 directions over one and a half texels each."""
@@ -169,11 +170,11 @@ class ReferenceBake:
 
     def field_statistics(self, surfaces: TexelSurfaces, source: np.ndarray) -> Field:
         """A dark field with states, validity and depth."""
-        share = self.back_face_share(surfaces, self.shells(surfaces, source))
+        shares = self.shares(surfaces, source)
         field = Field.empty(self.grid, self.settings.bands)
         field.state[:] = self.state
-        field.state[self.nodes[share > INVALID_SHARE]] = INVALID
-        field.validity[self.nodes] = 1 - share
+        field.state[self.nodes[inside_solid(shares)]] = INVALID
+        field.validity[self.nodes] = 1 - shares[:, 0]
         field.depth[self.nodes] = self.depth_moments(surfaces)
         field.offset[:] = self.offset
         return field

@@ -5,7 +5,8 @@ import numpy as np
 from gridlight.core.conventions import INVALID
 from gridlight.core.cubemap import octahedral_decode
 from gridlight.core.field import Field
-from gridlight.core.reference_bake import INVALID_SHARE, ReferenceBake, TexelSurfaces
+from gridlight.core.orientation import inside_solid
+from gridlight.core.reference_bake import ReferenceBake, TexelSurfaces
 from gridlight.gpu_shaders.backend import GpuBackend
 from shader_runner import read_layers
 
@@ -59,7 +60,7 @@ class Stages:
         shares = backend.read_shares()
         field = Field.empty(self.grid, self.settings.bands)
         field.state[:] = self.reference.state
-        field.state[nodes[shares[:, 0] > INVALID_SHARE]] = INVALID
+        field.state[nodes[inside_solid(shares)]] = INVALID
         field.validity[nodes] = 1 - shares[:, 0]
         field.depth[nodes] = backend.read_depth()
         backend.set_states(field.state)

@@ -2,7 +2,7 @@
 """The vote on objects whose normals point the wrong way."""
 
 import numpy as np
-from gridlight.core.orientation import ShellVote, flipped_objects
+from gridlight.core.orientation import ShellVote, flipped_objects, inside_solid
 
 
 def test_an_object_seen_from_behind_by_most_probes_is_flipped():
@@ -55,3 +55,13 @@ def test_a_light_leak_makes_no_shell():
 
 def test_in_the_dark_rooms_are_not_taken_for_solids():
     assert shells([[-1.0] * 8, [2.0] * 8], 2).all()
+
+
+def test_inside_a_solid():
+    """Shares of back faces of solids, background, lit, all back faces."""
+    shares = np.array([[0.6, 0, 0, 0.6], [0.4, 0, 0.5, 0.4], [0.0, 0, 0, 0.9], [0.0, 0.2, 0, 0.8], [0.0, 0, 0.1, 0.9]])
+    np.testing.assert_array_equal(inside_solid(shares), [True, False, True, False, False])
+
+
+def test_a_scene_without_light_has_no_insides():
+    assert not inside_solid(np.tile([0.0, 0, 0, 1.0], (3, 1))).any()
