@@ -139,6 +139,7 @@ def _emitters(info, defines: dict, first: int) -> int:
     if "HAS_EMITTERS" not in defines:
         return first
     _ints(info, "emitter_count")
+    info.push_constant("FLOAT", "emitter_reach")
     return _samplers(info, "emitters", first=first)
 
 
@@ -164,13 +165,12 @@ def direct_light_comp(info, defines):
 def emission_project_comp(info, defines):
     slot = _scene(info, defines)
     slot = _emitters(info, defines, slot)
-    slot = _samplers(info, "probe_slots", "texel_weights", first=slot)
+    slot = _samplers(info, "lights", "probe_slots", "texel_weights", first=slot)
     _samplers(info, "geometry", "emission", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "field", access="READ+WRITE")
-    _ints(info, "first_slot", "first_layer", "samples", "seed")
+    _ints(info, "first_slot", "first_layer", "light_count", "samples", "seed")
     info.local_group_size(int(defines["GROUP"]), 1, 1)
-    return {"compute": ["data_lib", "cubemap_lib", "random_lib", "spherical_harmonics_lib", "surface_lib", "ray_lib", "emitter_lib",
-                        "emission_project_comp"]}
+    return {"compute": ["data_lib", "cubemap_lib", "spherical_harmonics_lib", *_light_files(defines), "emission_project_comp"]}
 
 
 def light_iterate_comp(info, defines):

@@ -35,6 +35,8 @@ class SceneTextures:
         self.light_count = len(snapshot.lights)
         density = emitter_density[order]
         self.emitter_count = int((density > 0).sum())
+        # Nearer than this a direction about the normal finds an emitter at least as often as a point on the emitters falls there.
+        self.emitter_reach = (np.pi * density[density > 0].min()) ** -0.5 if self.emitter_count else 0.0
 
         material = np.clip(snapshot.material_index[order], 0, max(len(snapshot.materials) - 1, 0))
         rows = np.zeros((self.triangle_count, 3, 4), np.float32)
@@ -88,6 +90,7 @@ class SceneTextures:
         if self.emitter_count:
             self.bind_surfaces(shader)
             self.bind_emitters(shader)
+            shader.uniform_float("emitter_reach", self.emitter_reach)
         else:
             self.bind_rays(shader)
         self.bind(shader, "lights")

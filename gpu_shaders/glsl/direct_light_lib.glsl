@@ -29,6 +29,15 @@ void tangent_frame(vec3 n, out vec3 t, out vec3 b)
   b = vec3(c, s + n.y * n.y * a, -n.y);
 }
 
+/* Direction with density cos/π about the normal (Malley's method). */
+vec3 sample_cosine(vec3 normal, vec2 u)
+{
+  vec3 t, b;
+  tangent_frame(normal, t, b);
+  vec2 disk = sample_disk(u);
+  return normalize(disk.x * t + disk.y * b + sqrt(max(1.0 - u.x, 0.0)) * normal);
+}
+
 /* The cone lives in the object's own frame: right.w and up.w undo its scale against that of the axis. */
 float spot_mask(int light, vec3 towards, vec3 back, vec4 parameters)
 {

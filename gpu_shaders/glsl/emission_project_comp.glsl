@@ -1,11 +1,18 @@
 /* What probes see of sampled emitters, added to the field once the bounces have settled.
  *
- * Texels and `samples` points on the emitters are combined by the balance heuristic (Veach and Guibas, SIGGRAPH 1995): texels carry emitters
- * that fill many of them, points carry those that fall between texel centres.
+ * Two ways, each where it is denser: texels, which carry emitters that fill many of them, and `samples` points on the emitters, which
+ * carry those that fall between texel centres. Every place on an emitter belongs to one of the two. Texel centres are not random, so
+ * weights that mix the two would not sum to one over a small emitter.
  * Dispatch: one group of GROUP threads a probe; fixed order of summation.
  */
 
 SHARED_ vec4 partial_sums[COEFFICIENTS * GROUP];
+
+/* Points on emitters per steradian, as a probe sees them. */
+float point_density(float density, float squared_distance, float cosine)
+{
+  return float(samples) * density * squared_distance / cosine;
+}
 
 void main()
 {
@@ -25,11 +32,12 @@ void main()
       vec4 seen = texelFetch(geometry, at, 0);
       vec3 direction = texel_direction(at.xy);
       float cosine = max(abs(dot(direction, octahedral_decode(seen.xy))), 1.0e-4);
-      float point_density = float(samples) * emitted.a * seen.z * seen.z / cosine;
-      float texel_density = 1.0 / element(texel_weights, (at.y % FACE) * FACE + at.x).x;
-      sh_basis(direction, basis);
-      for (int c = 0; c < COEFFICIENTS; c++) {
-        sum[c] += emitted.rgb * (basis[c] / (texel_density + point_density));
+      float weight = element(texel_weights, (at.y % FACE) * FACE + at.x).x;
+      if (point_density(emitted.a, seen.z * seen.z, cosine) * weight < 1.0) {
+        sh_basis(direction, basis);
+        for (int c = 0; c < COEFFICIENTS; c++) {
+          sum[c] += emitted.rgb * (basis[c] * weight);
+        }
       }
     }
   }
@@ -40,14 +48,14 @@ void main()
     float squared = max(dot(offset, offset), 1.0e-20);
     float distance = sqrt(squared);
     vec3 direction = offset / distance;
-    if (!trace_any(slot.xyz, direction, distance * 0.9999)) {
-      float cosine = max(abs(dot(direction, emitter.normal)), 1.0e-4);
-      float point_density = float(samples) * emitter.density * squared / cosine;
-      ivec2 texel = direction_texel(direction);
-      float texel_density = 1.0 / element(texel_weights, (texel.y % FACE) * FACE + texel.x).x;
+    float cosine = max(abs(dot(direction, emitter.normal)), 1.0e-4);
+    float density = point_density(emitter.density, squared, cosine);
+    ivec2 texel = direction_texel(direction);
+    float weight = element(texel_weights, (texel.y % FACE) * FACE + texel.x).x;
+    if (density * weight >= 1.0 && !trace_any(slot.xyz, direction, distance * 0.9999)) {
       sh_basis(direction, basis);
       for (int c = 0; c < COEFFICIENTS; c++) {
-        sum[c] += emitter.radiance * (basis[c] / (texel_density + point_density));
+        sum[c] += emitter.radiance * (basis[c] / density);
       }
     }
   }

@@ -29,6 +29,18 @@ int find_emitter(float u)
   return low;
 }
 
+vec3 emitter_radiance(int triangle, vec2 barycentric)
+{
+  vec4 emission = element(materials, 3 * int(element(triangle_attributes, 5 * triangle).w) + 1);
+  vec3 radiance = emission.rgb;
+#ifdef HAS_IMAGES
+  if (emission.w >= 0.0) {
+    radiance *= sample_image(int(emission.w), triangle_uv(triangle, barycentric), 0.0).rgb;
+  }
+#endif
+  return radiance;
+}
+
 EmitterSample sample_emitter(vec3 u)
 {
   EmitterSample chosen;
@@ -42,13 +54,7 @@ EmitterSample sample_emitter(vec3 u)
   chosen.point = a + ab * barycentric.x + ac * barycentric.y;
   chosen.normal = normalize(cross(ab, ac));
   chosen.density = emitter.z;
-  vec4 emission = element(materials, 3 * int(element(triangle_attributes, 5 * triangle).w) + 1);
-  chosen.radiance = emission.rgb;
-#ifdef HAS_IMAGES
-  if (emission.w >= 0.0) {
-    chosen.radiance *= sample_image(int(emission.w), triangle_uv(triangle, barycentric), 0.0).rgb;
-  }
-#endif
+  chosen.radiance = emitter_radiance(triangle, barycentric);
 #ifdef HAS_ALPHA
   if (is_hole(triangle, barycentric)) {
     chosen.radiance = vec3(0.0);
@@ -57,8 +63,20 @@ EmitterSample sample_emitter(vec3 u)
   return chosen;
 }
 
-/* Irradiance of all sampled emitters at a surface, one shadow ray: sample `index` of the sequence of `key`. */
-vec3 emitter_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
+/* Share of the light from an emitter `distance` away that points on emitters answer for; directions about the normal answer for the
+ * rest. Balance heuristic (Veach and Guibas, SIGGRAPH 1995), so no estimate is larger than π·L however near the emitter is; beyond
+ * emitter_reach, where directions would hardly find it, points answer for all. */
+float point_share(float density, float distance, float surface_cosine, float emitter_cosine)
+{
+  if (distance >= emitter_reach) {
+    return 1.0;
+  }
+  float point_density = density * distance * distance;
+  return point_density / (point_density + surface_cosine * emitter_cosine * 0.3183098861837907);
+}
+
+/* Irradiance by points on emitters, one shadow ray: sample `index` of the sequence of `key`. */
+vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
 {
   vec3 best_irradiance = vec3(0.0), best_direction = vec3(0.0);
   float best_distance = 0.0, best_weight = 0.0, total = 0.0;
@@ -69,10 +87,10 @@ vec3 emitter_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int ind
     float squared = max(dot(offset, offset), 1.0e-20);
     float distance = sqrt(squared);
     vec3 direction = offset / distance;
-    float cosines = max(dot(direction, normal), 0.0) * abs(dot(direction, emitter.normal));
-    vec3 irradiance = emitter.radiance * (cosines / (squared * emitter.density));
-    /* no uniform emitter gives more than π·L: near a lamp the estimate is bounded by what is possible */
-    irradiance = min(irradiance, emitter.radiance * (3.141592653589793 * float(CANDIDATES)));
+    float surface_cosine = max(dot(direction, normal), 0.0);
+    float emitter_cosine = abs(dot(direction, emitter.normal));
+    vec3 irradiance = emitter.radiance * (surface_cosine * emitter_cosine / (squared * emitter.density) *
+                                          point_share(emitter.density, distance, surface_cosine, emitter_cosine));
     float weight = irradiance.r + irradiance.g + irradiance.b;
     total += weight;
     /* one number chooses among all candidates: what is left of it is spread over 0..1 again */
@@ -91,4 +109,30 @@ vec3 emitter_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int ind
     return vec3(0.0);
   }
   return best_irradiance * (total / (best_weight * float(CANDIDATES)));
+}
+
+/* Irradiance by a direction about the normal that finds an emitter within emitter_reach. */
+vec3 emitter_direction_irradiance(vec3 origin, vec3 normal, uvec3 key, int index)
+{
+  vec3 direction = sample_cosine(normal, sample_r2(key + uvec3(0u, 0x3C6EF372u, 0u), index));
+  Hit hit = trace_within(origin, direction, emitter_reach);
+  if (hit.triangle < 0) {
+    return vec3(0.0);
+  }
+  float density = element(triangle_attributes, 5 * hit.triangle + 4).z;
+  if (density == 0.0) {
+    return vec3(0.0);
+  }
+  vec3 a = element(triangle_corners, 3 * hit.triangle).xyz;
+  vec3 across = cross(element(triangle_corners, 3 * hit.triangle + 1).xyz - a,
+                      element(triangle_corners, 3 * hit.triangle + 2).xyz - a);
+  float share = point_share(density, hit.distance, dot(direction, normal), abs(dot(direction, normalize(across))));
+  return emitter_radiance(hit.triangle, hit.barycentric) * ((1.0 - share) * 3.141592653589793);
+}
+
+/* Irradiance of all sampled emitters at a surface: sample `index` of the sequences of `key`. */
+vec3 emitter_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
+{
+  return emitter_points_irradiance(point, origin, normal, key, index) +
+         emitter_direction_irradiance(origin, normal, key, index);
 }

@@ -6,14 +6,6 @@
  * (next-event estimation), emission that the field carries is found by the paths. The key of a number is (probe, texel, bounce, seed): any split of the work gives the same bytes.
  */
 
-vec3 sample_cosine(vec3 normal, vec2 u)
-{
-  vec3 t, b;
-  tangent_frame(normal, t, b);
-  vec2 disk = sample_disk(u);
-  return normalize(disk.x * t + disk.y * b + sqrt(max(1.0 - u.x, 0.0)) * normal);
-}
-
 vec3 end_irradiance(vec3 point, vec3 normal)
 {
   float weights[8];

@@ -116,10 +116,11 @@ bool intersect_triangle(Ray ray, int index, inout Hit hit)
     float swap_child = child[i]; child[i] = child[j]; child[j] = swap_child; \
   }
 
-Hit trace_closest(vec3 origin, vec3 direction)
+/* The nearest hit closer than `limit`; triangle −1 and distance `limit` where there is none. */
+Hit trace_within(vec3 origin, vec3 direction, float limit)
 {
   Ray ray = make_ray(origin, direction);
-  Hit hit = Hit(NO_HIT, -1, vec2(0.0));
+  Hit hit = Hit(limit, -1, vec2(0.0));
   int stack[STACK_SIZE];
   float stack_entry[STACK_SIZE];
   int top = 0;
@@ -151,6 +152,11 @@ Hit trace_closest(vec3 origin, vec3 direction)
     } while (stack_entry[top] > hit.distance);
     item = stack[top];
   }
+}
+
+Hit trace_closest(vec3 origin, vec3 direction)
+{
+  return trace_within(origin, direction, NO_HIT);
 }
 
 /* Is anything hit nearer than `limit`? */
