@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """When light iterations may stop, and how much light is still missing.
 
-Iterations are a geometric series: once one mode dominates, each change is r times the one before, and what is still to come is
-change · r/(1−r). That sum, not the last change, is held against the tolerance; a furnace with albedo 0.99 shows why: its changes are
-1 % of the field when 63 % of the light is still missing. Where the changes have become parallel, the sum is added at once (Aitken's
-delta-squared process for vectors), which saves most iterations of bright rooms. Parallel matters: a mode that alternates
-in sign shrinks just as steadily and would be blown up. Two estimates in a row must be below the tolerance: bright lamps in view and a dim
-room around them are two modes, and the first changes tell only of the fast one.
+Iterations are a geometric series: once one mode dominates, each change is r times the one before, and what is still to
+come is change · r/(1−r). That sum, not the last change, is held against the tolerance; a furnace with albedo 0.99
+shows why: its changes are 1 % of the field when 63 % of the light is still missing. Where the changes have become
+parallel, the sum is added at once (Aitken's delta-squared process for vectors), which saves most iterations of bright
+rooms. Parallel matters: a mode that alternates in sign shrinks just as steadily and would be blown up. Two estimates
+in a row must be below the tolerance: bright lamps in view and a dim room around them are two modes, and the first
+changes tell only of the fast one.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ class Convergence:
         self.reason = ""
 
     def add(self, energy: float, change: float, overlap: float) -> float:
-        """Takes |field|², |change|² and change · last change of one iteration. Returns the factor to extrapolate by, 0 for none.
+        """Takes |field|², |change|² and change · last change of one iteration. Returns the factor to extrapolate by, 0
+        for none.
 
         The first iteration gathers direct light and emission, each further one is a bounce.
         """
@@ -53,16 +55,23 @@ class Convergence:
         bounces = self.iterations - 1
         if self._bounces is not None:
             self.done = bounces >= self._bounces
-            self.converged = True
-            self.reason = f"stopped after the {self._bounces} bounces asked for, {self.missing:.2g} of the light estimated missing"
+            self.converged = self.missing < self._tolerance
+            self.reason = (
+                f"stopped after the {self._bounces} bounces asked for, "
+                f"an estimated {self.missing:.2g} of the light is missing"
+            )
         elif self.missing < self._tolerance and (last_missing < self._tolerance or relative < _ROUNDING):
             self.done = self.converged = True
-            self.reason = (f"converged after {self.iterations} iterations: an estimated {self.missing:.2g} of the light is missing, "
-                           f"tolerance {self._tolerance:g}")
+            self.reason = (
+                f"converged after {self.iterations} iterations: an estimated {self.missing:.2g} "
+                f"of the light is missing, tolerance {self._tolerance:g}"
+            )
         elif bounces >= AUTO_LIMIT:
             self.done = True
-            self.reason = (f"not converged after {AUTO_LIMIT} bounces: each still adds {ratio:.4f} of the one before; "
-                           "surfaces that reflect all light never settle, lower their base colour")
+            self.reason = (
+                f"not converged after {AUTO_LIMIT} bounces: each still adds {ratio:.4f} of the one before; "
+                "surfaces that reflect all light never settle, lower their base colour"
+            )
         elif len(self._lengths) >= 3 and self._is_parallel(overlap):
             step = self._lengths[-1] / self._lengths[-2]
             self._slowest = max(self._slowest, step)
@@ -71,7 +80,8 @@ class Convergence:
         return 0.0
 
     def _is_parallel(self, overlap: float) -> bool:
-        """Do the last two changes belong to one mode? The slower it is, the more it is multiplied and the less else may be in it."""
+        """Do the last two changes belong to one mode? The slower it is, the more it is multiplied and the less else
+        may be in it."""
         last, before = self._lengths[-1], self._lengths[-2]
         if overlap <= 0 or last >= _MOST_RATIO * before:
             return False
@@ -80,8 +90,9 @@ class Convergence:
         return sine_squared < least
 
     def _ratio(self) -> float:
-        """By how much a change is smaller than the one before, the larger of the last step and the mean of the last two: where a fast
-        mode hides a slow one the last step is first to show it, where changes alternate the mean is steadier."""
+        """By how much a change is smaller than the one before, the larger of the last step and the mean of the last
+        two: where a fast mode hides a slow one the last step is first to show it, where changes alternate the mean is
+        steadier."""
         lengths = self._lengths
         if len(lengths) < 2 or lengths[-2] == 0:
             return math.inf

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The bake from a scene snapshot to a field.
 
-``bake_steps`` is the whole job as a generator that yields between pieces of GPU work: ``run_bake`` drives it to the end, a timer can drive it
-step by step. Cancelling is not calling ``next`` again.
+``bake_steps`` is the whole job as a generator that yields between pieces of GPU work: ``run_bake`` drives it to the
+end, a timer can drive it step by step. Cancelling is not calling ``next`` again.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Protocol
 import numpy as np
 
 from ..core import culling, dilation, relocation
-from ..core.conventions import ACTIVE, CULLED, DEPTH_EDGE, INVALID
+from ..core.conventions import ACTIVE, CULLED, INVALID
 from ..core.errors import Cancelled, InputError
 from ..core.field import Field
 from ..core.grid import Grid
@@ -28,7 +28,6 @@ from ..gpu_shaders.backend import GpuBackend, Surfaces
 from ..gpu_shaders.scene_textures import SceneTextures
 from .capture_choice import choose_capture
 from .convergence import Convergence
-
 
 
 class Reporter(Protocol):
@@ -45,7 +44,8 @@ class Reporter(Protocol):
 
 @dataclass
 class BakeResult:
-    """What a bake produced. ``seconds`` by phase; ``energy`` per iteration: mean luminance of band 0 over active probes."""
+    """What a bake produced. ``seconds`` by phase; ``energy`` per iteration: mean luminance of band 0 over active
+    probes."""
 
     field: Field | None = None
     iterations: int = 0
@@ -60,8 +60,9 @@ class BakeResult:
     warnings: list[str] = default(default_factory=list)
 
 
-def run_bake(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, reporter: Reporter,
-             should_stop: Callable[[], bool]) -> BakeResult:
+def run_bake(
+    snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, reporter: Reporter, should_stop: Callable[[], bool]
+) -> BakeResult:
     """Bakes ``snapshot`` into ``grid``. Needs a GPU context.
 
     Raises:
@@ -75,8 +76,9 @@ def run_bake(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, report
     return result
 
 
-def bake_steps(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, reporter: Reporter,
-               result: BakeResult) -> Iterator[None]:
+def bake_steps(
+    snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, reporter: Reporter, result: BakeResult
+) -> Iterator[None]:
     """The bake in steps; fills ``result`` as it goes and completes it with the last step."""
     if not len(snapshot.triangles):
         raise InputError(f"scene '{snapshot.name}' has no surface that renders; add or unhide a mesh")
@@ -103,8 +105,10 @@ def bake_steps(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, repo
 
     batches = _Batches(backend, len(nodes), result.capture, result)
     if not batches.resident:
-        result.notes.append(f"texel surfaces of {len(nodes)} probes exceed the memory budget of {settings.memory_mib} MiB: "
-                            "they are captured again in every iteration")
+        result.notes.append(
+            f"texel surfaces of {len(nodes)} probes exceed the memory budget of {settings.memory_mib} MiB: "
+            "they are captured again in every iteration"
+        )
     reporter.phase("capture", len(nodes))
     vote = ShellVote(backend.object_count)
     for index in range(batches.count):
@@ -169,10 +173,16 @@ def bake_steps(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, repo
         result.change = convergence.changes
         result.notes.append(convergence.reason)
         result.field = _finish(backend, grid, settings, state, nodes, shares, offset)
-    result.counts = {"total": grid.count, "active": int((state == ACTIVE).sum()), "culled": int((state == CULLED).sum()),
-                     "invalid": int((state == INVALID).sum())}
+    result.counts = {
+        "total": grid.count,
+        "active": int((state == ACTIVE).sum()),
+        "culled": int((state == CULLED).sum()),
+        "invalid": int((state == INVALID).sum()),
+    }
     if not np.isfinite(result.field.coefficients).all():
-        raise InputError(f"scene '{snapshot.name}' sends light that is not finite; look for lights or emission beyond 1e30")
+        raise InputError(
+            f"scene '{snapshot.name}' sends light that is not finite; look for lights or emission beyond 1e30"
+        )
 
 
 class _Batches:
@@ -240,8 +250,9 @@ def _each_statistics(batches: _Batches, backend: GpuBackend) -> Iterator[None]:
         yield
 
 
-def _relocate(batches: _Batches, backend: GpuBackend, grid: Grid, nodes: np.ndarray, shares: np.ndarray,
-              offset: np.ndarray) -> Iterator[None]:
+def _relocate(
+    batches: _Batches, backend: GpuBackend, grid: Grid, nodes: np.ndarray, shares: np.ndarray, offset: np.ndarray
+) -> Iterator[None]:
     """Moves probes that stand in or behind walls, fills ``offset`` (P, 3) in metres and returns how many moved.
 
     A probe that sees no light from its new place either goes back.
@@ -281,9 +292,15 @@ def _cull(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, result: B
     return np.where(needed, ACTIVE, CULLED).astype(np.uint8)
 
 
-def _finish(backend: GpuBackend, grid: Grid, settings: BakeSettings, state: np.ndarray, nodes: np.ndarray,
-            shares: np.ndarray,
-            offset: np.ndarray) -> Field:
+def _finish(
+    backend: GpuBackend,
+    grid: Grid,
+    settings: BakeSettings,
+    state: np.ndarray,
+    nodes: np.ndarray,
+    shares: np.ndarray,
+    offset: np.ndarray,
+) -> Field:
     """Reads the field back and completes it for probes without light of their own."""
     baked = Field.empty(grid, settings.bands)
     baked.state[:] = state
@@ -298,8 +315,10 @@ def _warn_about_light(snapshot: SceneSnapshot, result: BakeResult) -> None:
     emits = any(max(m.emission) > 0 for m in snapshot.materials)
     world = snapshot.world.map is not None or max(snapshot.world.color) > 0
     if not (snapshot.lights or emits or world):
-        result.warnings.append(f"scene '{snapshot.name}' has no light: no lamp, emission or world; the field is black. Add a light or "
-                               "enable its rendering")
+        result.warnings.append(
+            f"scene '{snapshot.name}' has no light: no lamp, emission or world; the field is black. Add a light or "
+            "enable its rendering"
+        )
 
 
 @contextmanager

@@ -20,12 +20,18 @@ WIDTH, HEIGHT = 960, 540
 _SAMPLES = 4  # per pixel
 
 
-def write_previews(snapshot: SceneSnapshot, scene: SceneTextures, field: Field, picture: Path, probes: Path,
-                   should_stop: Callable[[], bool]) -> None:
+def write_previews(
+    snapshot: SceneSnapshot,
+    scene: SceneTextures,
+    field: Field,
+    picture: Path,
+    probes: Path,
+    should_stop: Callable[[], bool],
+) -> None:
     """Renders the scene with ``field``, once plain and once with its probes as spheres, into two PNG files.
 
-    ``scene`` holds ``snapshot`` with the field's grid centre as origin. The view is the scene's camera, or one inside the volume. Colours
-    go through the Standard view transform with the scene's exposure.
+    ``scene`` holds ``snapshot`` with the field's grid centre as origin. The view is the scene's camera, or one inside
+    the volume. Colours go through the Standard view transform with the scene's exposure.
 
     Raises:
         Cancelled: ``should_stop`` returned true.
@@ -40,8 +46,8 @@ def write_previews(snapshot: SceneSnapshot, scene: SceneTextures, field: Field, 
 
 
 def standard_view(radiance: np.ndarray, exposure: float) -> np.ndarray:
-    """Display values 0..1 of linear ``radiance``: Blender's Standard view, which is exposure in stops and the sRGB curve
-    (IEC 61966-2-1)."""
+    """Display values 0..1 of linear ``radiance``: Blender's Standard view, which is exposure in stops and the sRGB
+    curve (IEC 61966-2-1)."""
     linear = np.clip(np.nan_to_num(radiance) * 2.0**exposure, 0.0, 1.0)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 

@@ -28,7 +28,8 @@ def load_package():
     """The package ``gridlight`` from the folder above this file, registered in ``sys.modules``."""
     root = Path(__file__).resolve().parent.parent
     spec = importlib.util.spec_from_file_location(
-        "gridlight", root / "__init__.py", submodule_search_locations=[str(root)])
+        "gridlight", root / "__init__.py", submodule_search_locations=[str(root)]
+    )
     package = importlib.util.module_from_spec(spec)
     sys.modules["gridlight"] = package
     spec.loader.exec_module(package)

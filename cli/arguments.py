@@ -9,8 +9,24 @@ import math
 from ..core.errors import InputError
 
 # Options whose values may start with a minus sign, which argparse would take for another option.
-SIGNED_OPTIONS = ("--min", "--max", "--spacing", "--seed", "--frame", "--tolerance", "--bounces", "--gather",
-                  "--samples", "--bands", "--face", "--memory", "--resolution", "--points", "--spp", "--height")
+SIGNED_OPTIONS = (
+    "--min",
+    "--max",
+    "--spacing",
+    "--seed",
+    "--frame",
+    "--tolerance",
+    "--bounces",
+    "--gather",
+    "--samples",
+    "--bands",
+    "--face",
+    "--memory",
+    "--resolution",
+    "--points",
+    "--spp",
+    "--height",
+)
 
 
 class Parser(argparse.ArgumentParser):

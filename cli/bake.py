@@ -39,32 +39,74 @@ def add_settings(parser) -> None:
     """The options that become a BakeSettings, with its defaults."""
     standard = BakeSettings()
     group = parser.add_argument_group("bake")
-    group.add_argument("--bands", metavar="1..4", type=int, default=standard.bands,
-                       help="spherical-harmonic bands; a fourth adds nothing to diffuse light (default %(default)s)")
-    group.add_argument("--face", metavar="N", type=int, default=standard.face,
-                       help="texels per cube face edge (default %(default)s)")
-    group.add_argument("--bounces", metavar="N|auto", type=arguments.bounces, default=standard.bounces,
-                       help="light iterations; auto: until the tolerance is met (default auto)")
-    group.add_argument("--tolerance", metavar="T", type=float, default=standard.tolerance,
-                       help="relative energy still missing when iterations stop (default %(default)s)")
-    group.add_argument("--gather", metavar="N", type=int, default=standard.gather,
-                       help="bounces really traced before the field is read (default %(default)s)")
-    group.add_argument("--samples", metavar="N", type=int, default=standard.samples,
-                       help="shadow samples per texel and soft light (default %(default)s)")
-    group.add_argument("--capture", choices=CAPTURES, default=standard.capture,
-                       help="how probes see (default %(default)s)")
-    group.add_argument("--seed", metavar="N", type=int, default=standard.seed,
-                       help="of the sampling (default %(default)s)")
+    group.add_argument(
+        "--bands",
+        metavar="1..4",
+        type=int,
+        default=standard.bands,
+        help="spherical-harmonic bands; a fourth adds nothing to diffuse light (default %(default)s)",
+    )
+    group.add_argument(
+        "--face", metavar="N", type=int, default=standard.face, help="texels per cube face edge (default %(default)s)"
+    )
+    group.add_argument(
+        "--bounces",
+        metavar="N|auto",
+        type=arguments.bounces,
+        default=standard.bounces,
+        help="light iterations; auto: until the tolerance is met (default auto)",
+    )
+    group.add_argument(
+        "--tolerance",
+        metavar="T",
+        type=float,
+        default=standard.tolerance,
+        help="relative energy still missing when iterations stop (default %(default)s)",
+    )
+    group.add_argument(
+        "--gather",
+        metavar="N",
+        type=int,
+        default=standard.gather,
+        help="bounces really traced before the field is read (default %(default)s)",
+    )
+    group.add_argument(
+        "--samples",
+        metavar="N",
+        type=int,
+        default=standard.samples,
+        help="shadow samples per texel and soft light (default %(default)s)",
+    )
+    group.add_argument(
+        "--capture", choices=CAPTURES, default=standard.capture, help="how probes see (default %(default)s)"
+    )
+    group.add_argument(
+        "--seed", metavar="N", type=int, default=standard.seed, help="of the sampling (default %(default)s)"
+    )
     group.add_argument("--keep-all", action="store_true", help="bake every probe, cull none")
-    group.add_argument("--memory", metavar="MIB", type=int, default=standard.memory_mib,
-                       help="limit for GPU textures of the capture (default %(default)s)")
+    group.add_argument(
+        "--memory",
+        metavar="MIB",
+        type=int,
+        default=standard.memory_mib,
+        help="limit for GPU textures of the capture (default %(default)s)",
+    )
 
 
 def settings_from(args) -> BakeSettings:
     """Raises InputError for values out of range."""
-    return BakeSettings(bands=args.bands, face=args.face, bounces=args.bounces, tolerance=args.tolerance,
-                        gather=args.gather, samples=args.samples, capture=args.capture, seed=args.seed,
-                        keep_all=args.keep_all, memory_mib=args.memory)
+    return BakeSettings(
+        bands=args.bands,
+        face=args.face,
+        bounces=args.bounces,
+        tolerance=args.tolerance,
+        gather=args.gather,
+        samples=args.samples,
+        capture=args.capture,
+        seed=args.seed,
+        keep_all=args.keep_all,
+        memory_mib=args.memory,
+    )
 
 
 def check(args) -> None:

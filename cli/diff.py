@@ -28,8 +28,8 @@ def run(args, reporter, should_stop):
 def compare(first, second) -> dict:
     """Differences of two fields of one grid over the probes that are active in both.
 
-    Per band the root mean square of the coefficients' difference, absolute and relative to that of ``first`` (None where
-    that is zero). Where the number of bands differs, the missing ones count as zero.
+    Per band the root mean square of the coefficients' difference, absolute and relative to that of ``first`` (None
+    where that is zero). Where the number of bands differs, the missing ones count as zero.
 
     Raises:
         InputError: the grids are not the same.
@@ -56,12 +56,18 @@ def compare(first, second) -> dict:
         per_probe = np.sqrt(np.mean(difference**2, axis=(1, 2)))
         row = int(np.argmax(per_probe))
         flat = int(np.flatnonzero(both)[row])
-        worst = {"node": first.grid.lattice()[flat].tolist(), "position": first.grid.positions()[flat].tolist(),
-                 "rms": float(per_probe[row])}
+        worst = {
+            "node": first.grid.lattice()[flat].tolist(),
+            "position": first.grid.positions()[flat].tolist(),
+            "rms": float(per_probe[row]),
+        }
     scale = _rms(values[0])
     return {
-        "identical": bool(first.bands == second.bands and np.array_equal(first.coefficients, second.coefficients)
-                          and np.array_equal(first.state, second.state)),
+        "identical": bool(
+            first.bands == second.bands
+            and np.array_equal(first.coefficients, second.coefficients)
+            and np.array_equal(first.state, second.state)
+        ),
         "compared": int(both.sum()),
         "states_differ": int((first.state != second.state).sum()),
         "rms": _rms(difference),
@@ -79,8 +85,10 @@ def _text(args, summary: dict) -> str:
     def share(value):
         return "" if value is None else f"  ({100 * value:.4g} %)"
 
-    lines = [f"{args.first} and {args.second}: {'identical' if summary['identical'] else 'different'}, "
-             f"{summary['compared']} probes active in both, {summary['states_differ']} with another state"]
+    lines = [
+        f"{args.first} and {args.second}: {'identical' if summary['identical'] else 'different'}, "
+        f"{summary['compared']} probes active in both, {summary['states_differ']} with another state"
+    ]
     lines += [f"  band {row['band']}   rms {row['rms']:.6g}{share(row['relative'])}" for row in summary["bands"]]
     lines.append(f"  all      rms {summary['rms']:.6g}{share(summary['relative'])}")
     if summary["worst"]:

@@ -45,5 +45,9 @@ def run(args, reporter, should_stop):
                 reporter.advance(len(rows))
         if not count:
             reporter.warn(f"{args.points} holds no points")
-    return {"points": count, "seconds": {"total": round(time.perf_counter() - started, 6)}, "files": [args.output],
-            "warnings": reporter.warnings}, 0
+    return {
+        "points": count,
+        "seconds": {"total": round(time.perf_counter() - started, 6)},
+        "files": [args.output],
+        "warnings": reporter.warnings,
+    }, 0

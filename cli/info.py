@@ -30,12 +30,17 @@ def summarise(field) -> dict:
     corners = np.array([[x, y, z, 1.0] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) @ grid.matrix.T
     summary = {
         **field.metadata,
-        "probes": {"total": grid.count, "active": int(active.sum()), "culled": int((field.state == CULLED).sum()),
-                   "invalid": int((field.state == INVALID).sum())},
+        "probes": {
+            "total": grid.count,
+            "active": int(active.sum()),
+            "culled": int((field.state == CULLED).sum()),
+            "invalid": int((field.state == INVALID).sum()),
+        },
         "bounds": {"min": corners[:, :3].min(axis=0).tolist(), "max": corners[:, :3].max(axis=0).tolist()},
         "spacing": grid.cell_size().tolist(),
-        "mean_radiance": None if not len(mean) else
-        {"min": float(mean.min()), "mean": float(mean.mean()), "max": float(mean.max())},
+        "mean_radiance": None
+        if not len(mean)
+        else {"min": float(mean.min()), "mean": float(mean.mean()), "max": float(mean.max())},
     }
     summary.setdefault("warnings", [])
     return summary
@@ -56,8 +61,9 @@ def _text(path: str, summary: dict) -> str:
         f"  bands      {summary['bands']}",
     ]
     if light:
-        lines.append(f"  radiance   mean per active probe {light['min']:.4g} to {light['max']:.4g}, "
-                     f"average {light['mean']:.4g}")
+        lines.append(
+            f"  radiance   mean per active probe {light['min']:.4g} to {light['max']:.4g}, average {light['mean']:.4g}"
+        )
     if "device" in summary:
         lines.append(f"  device     {summary['device']}")
     if isinstance(summary.get("settings"), dict):

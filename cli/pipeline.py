@@ -67,8 +67,9 @@ def check_snapshot(snapshot: SceneSnapshot, reporter) -> None:
         reporter.warn(warning)
 
 
-def bake_volumes(snapshot: SceneSnapshot, grids: list[Grid], settings: BakeSettings, reporter, should_stop,
-                 stopwatch: Stopwatch) -> list[BakeResult]:
+def bake_volumes(
+    snapshot: SceneSnapshot, grids: list[Grid], settings: BakeSettings, reporter, should_stop, stopwatch: Stopwatch
+) -> list[BakeResult]:
     """Bakes ``grids`` one after the other."""
     for grid in grids:
         probe_file.check_size(grid, settings.bands)
@@ -82,15 +83,25 @@ def bake_volumes(snapshot: SceneSnapshot, grids: list[Grid], settings: BakeSetti
             reporter.warn(warning)
         for note in result.notes:
             reporter.note(note)
-        if not result.converged:
-            reporter.warn(f"{grid.name}: the light has not settled after {result.iterations} iterations; the files are "
-                          "written and marked. Raise --bounces or --tolerance, or darken materials that reflect all light")
+        if _unsettled(result, settings):
+            reporter.warn(
+                f"{grid.name}: the light has not settled after {result.iterations} iterations; the files are "
+                "written and marked. Raise --tolerance, or darken materials that reflect all light"
+            )
         results.append(result)
     return results
 
 
-def write_results(title: str, snapshot: SceneSnapshot, settings: BakeSettings, results: list[BakeResult],
-                  folder: StagedFolder, reporter, should_stop, stopwatch: Stopwatch) -> tuple[dict, int]:
+def write_results(
+    title: str,
+    snapshot: SceneSnapshot,
+    settings: BakeSettings,
+    results: list[BakeResult],
+    folder: StagedFolder,
+    reporter,
+    should_stop,
+    stopwatch: Stopwatch,
+) -> tuple[dict, int]:
     """Stages probe files, pictures and report in ``folder``. Returns (summary, exit status)."""
     device = device_description()
     names = volume_names([result.field.grid for result in results])
@@ -98,34 +109,67 @@ def write_results(title: str, snapshot: SceneSnapshot, settings: BakeSettings, r
     with stopwatch.measure("write"):
         reporter.phase("write")
         for name, result in zip(names, results):
-            result.field.metadata = {**result.field.metadata, **probe_metadata.provenance(
-                snapshot, settings, device, result.iterations, result.converged, reporter.warnings)}
+            result.field.metadata = {
+                **result.field.metadata,
+                **probe_metadata.provenance(
+                    snapshot, settings, device, result.iterations, result.converged, reporter.warnings
+                ),
+            }
             probe_file.write(folder.path(f"probes{name}.exr"), result.field)
         reporter.phase("pictures", len(results))
         for name, result in zip(names, results):
             pictures = folder.path(f"preview{name}.png"), folder.path(f"preview_probes{name}.png")
             write_previews(snapshot, result.scene, result.field, *pictures, should_stop)
             volume = result.field.grid.name
-            images += [(f"{volume}: direct light and field", pictures[0].read_bytes()),
-                       (f"{volume}: probes", pictures[1].read_bytes())]
+            images += [
+                (f"{volume}: direct light and field", pictures[0].read_bytes()),
+                (f"{volume}: probes", pictures[1].read_bytes()),
+            ]
             reporter.advance()
     summary = _summary(results, device, settings, stopwatch, reporter)
     report = ReportData(
-        title=title, settings=settings.as_dict(), device=device, blender=bpy.app.version_string,
-        generator=f"Gridlight {probe_metadata.program_version()}", counts=summary["probes"], seconds=summary["seconds"],
-        warnings=reporter.warnings, images=images, summary=summary,
-        volumes=[VolumeReport(result.field, result.field.grid.name, result.energy, result.change, result.iterations,
-                              result.converged, result.notes) for result in results])
+        title=title,
+        settings=settings.as_dict(),
+        device=device,
+        blender=bpy.app.version_string,
+        generator=f"Gridlight {probe_metadata.program_version()}",
+        counts=summary["probes"],
+        seconds=summary["seconds"],
+        warnings=reporter.warnings,
+        images=images,
+        summary=summary,
+        volumes=[
+            VolumeReport(
+                result.field,
+                result.field.grid.name,
+                result.energy,
+                result.change,
+                result.iterations,
+                result.converged,
+                result.notes,
+            )
+            for result in results
+        ],
+    )
     summary["files"] = [str(folder.folder / name) for name in [*folder.names, "report.html"]]
     write_report(folder.path("report.html"), report)
-    return summary, 0 if summary["converged"] else NOT_CONVERGED
+    return summary, NOT_CONVERGED if any(_unsettled(result, settings) for result in results) else 0
+
+
+def _unsettled(result: BakeResult, settings: BakeSettings) -> bool:
+    """Did the light fail to settle where it should have? A number of bounces that was asked for is no failure."""
+    return settings.bounces is None and not result.converged
 
 
 def _summary(results, device: str, settings: BakeSettings, stopwatch: Stopwatch, reporter) -> dict:
     states = np.concatenate([result.field.state for result in results])
     return {
-        "probes": {"total": len(states), "active": int((states == ACTIVE).sum()),
-                   "culled": int((states == CULLED).sum()), "invalid": int((states == INVALID).sum())},
+        "probes": {
+            "total": len(states),
+            "active": int((states == ACTIVE).sum()),
+            "culled": int((states == CULLED).sum()),
+            "invalid": int((states == INVALID).sum()),
+        },
         "iterations": max(result.iterations for result in results),
         "converged": all(result.converged for result in results),
         "seconds": stopwatch.totals(),

@@ -28,8 +28,14 @@ LIBRARIES = {
 # libEGL only dispatches: one of these has to be there to do the work.
 EGL_VENDORS = ("libEGL_mesa.so.0", "libEGL_nvidia.so.0")
 # Mesa's drivers (llvmpipe among them): one file each in a folder, or all in one library since Mesa 24.2.
-MESA_DRIVERS = ("/usr/lib/*/dri/*_dri.so", "/usr/lib64/dri/*_dri.so", "/usr/lib/dri/*_dri.so",
-                "/usr/lib/*/libgallium-*.so", "/usr/lib64/libgallium-*.so", "/usr/lib/libgallium-*.so")
+MESA_DRIVERS = (
+    "/usr/lib/*/dri/*_dri.so",
+    "/usr/lib64/dri/*_dri.so",
+    "/usr/lib/dri/*_dri.so",
+    "/usr/lib/*/libgallium-*.so",
+    "/usr/lib64/libgallium-*.so",
+    "/usr/lib/libgallium-*.so",
+)
 
 
 def missing_packages() -> list[str]:
@@ -60,8 +66,10 @@ def ensure(say) -> str | None:
         return None
     command = install_command(packages)
     if shutil.which("apt-get") is None:
-        return ("system libraries for a GPU context are missing; install with your package manager what Debian calls "
-                f"{', '.join(packages)}")
+        return (
+            "system libraries for a GPU context are missing; install with your package manager what Debian calls "
+            f"{', '.join(packages)}"
+        )
     if os.geteuid() != 0:
         return f"system libraries for a GPU context are missing; install them with: sudo sh -c '{command}'"
     say(f"installing system libraries for a GPU context: {command}")

@@ -21,10 +21,11 @@ _TRIES = 200  # candidates per point that is asked for
 
 
 class FreeSpace:
-    """Tells free space from the inside of solids, by rays against the scene's triangles: back faces all around mean inside.
+    """Tells free space from the inside of solids, by rays against the scene's triangles: back faces all around mean
+    inside.
 
-    Objects that free space sees from behind, such as a room made of a cube, count as inside out; the points that are asked for vote
-    on it together, as in ``core.orientation``.
+    Objects that free space sees from behind, such as a room made of a cube, count as inside out; the points that are
+    asked for vote on it together, as in ``core.orientation``.
     """
 
     def __init__(self, snapshot: SceneSnapshot):
@@ -34,7 +35,9 @@ class FreeSpace:
         # Blender's tree is single precision: rays start from the middle of the scene, not from the world's origin.
         low, high = snapshot.bounds()
         self._origin = (low + high) / 2
-        self._tree = BVHTree.FromPolygons((snapshot.vertices - self._origin).tolist(), snapshot.triangles.tolist(), all_triangles=True)
+        self._tree = BVHTree.FromPolygons(
+            (snapshot.vertices - self._origin).tolist(), snapshot.triangles.tolist(), all_triangles=True
+        )
         self._flipped: np.ndarray | None = None
 
     def is_free(self, points: np.ndarray, clearance_m: float = 0.0) -> np.ndarray:
@@ -46,7 +49,9 @@ class FreeSpace:
         behind = (seen != 0) & ((seen < 0) != self._flipped[item])
         free = behind.mean(axis=1) <= _FREE_SHARE
         if clearance_m > 0:
-            near = [self._tree.find_nearest(point, clearance_m)[0] is not None for point in (points - self._origin).tolist()]
+            near = [
+                self._tree.find_nearest(point, clearance_m)[0] is not None for point in (points - self._origin).tolist()
+            ]
             free &= ~np.array(near, bool)
         return free
 
@@ -55,7 +60,9 @@ class FreeSpace:
         offset = second - first
         distance = np.linalg.norm(offset, axis=1)
         rays = zip((first - self._origin).tolist(), offset.tolist(), distance.tolist())
-        return np.array([length == 0 or self._tree.ray_cast(start, step, length)[2] is None for start, step, length in rays], bool)
+        return np.array(
+            [length == 0 or self._tree.ray_cast(start, step, length)[2] is None for start, step, length in rays], bool
+        )
 
     def _sightings(self, points: np.ndarray) -> np.ndarray:
         """(N, _RAYS) int: ±(object + 1) that each ray meets, negative from behind, 0 for the sky."""

@@ -106,7 +106,10 @@ def run_in_child(argv: list[str], say, needs_gpu: bool, verbose: bool) -> tuple[
         child = subprocess.Popen(
             [sys.executable, "-I", str(start), *argv],
             env={**os.environ, DESCRIPTORS: f"{status_write},{log.fileno()},{alive_read}"},
-            pass_fds=(status_write, log.fileno(), alive_read), stdin=subprocess.DEVNULL, process_group=0)
+            pass_fds=(status_write, log.fileno(), alive_read),
+            stdin=subprocess.DEVNULL,
+            process_group=0,
+        )
         os.close(status_write)
         os.close(alive_read)
         interrupts = _forward_interrupts(child)
@@ -159,6 +162,8 @@ def _death_line(number: int, before_context: bool) -> str:
         return "the baking process was killed, most likely for lack of memory; use a lower --memory or --resolution"
     if before_context:
         drivers = system_libraries.install_command(["libegl1", "libegl-mesa0", "libgl1", "libgl1-mesa-dri"])
-        return (f"no usable GPU context: Blender ended with {name} while it made one (--verbose shows its words); "
-                f"install a GPU driver or Mesa's software driver: {drivers}")
+        return (
+            f"no usable GPU context: Blender ended with {name} while it made one (--verbose shows its words); "
+            f"install a GPU driver or Mesa's software driver: {drivers}"
+        )
     return f"Blender ended with {name} in its GPU driver or its own code; the lines above (or --verbose) say where"

@@ -2,9 +2,10 @@
 """Bounding volume hierarchy over triangles: built bottom-up, flattened to four-wide nodes for the GPU.
 
 Building is PLOC (Meister and Bittner, "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy Construction",
-TVCG 2018): clusters in Morton order merge with the neighbour whose joint box has the least surface, which gives trees as good as a
-full sweep of the surface area heuristic and is nothing but array operations. The binary tree is then collapsed to
-four-wide nodes (Wald et al. 2008), the widest child first, so that a traversal step fetches one node and tests four boxes.
+TVCG 2018): clusters in Morton order merge with the neighbour whose joint box has the least surface, which gives trees
+as good as a full sweep of the surface area heuristic and is nothing but array operations. The binary tree is then
+collapsed to four-wide nodes (Wald et al. 2008), the widest child first, so that a traversal step fetches one node and
+tests four boxes.
 
 Flat layout, one row of RGBA32F texels per node (``NODE_TEXELS``)::
 
@@ -12,8 +13,8 @@ Flat layout, one row of RGBA32F texels per node (``NODE_TEXELS``)::
     1 low y                       4 high y                           −1−t leaf that starts at triangle t
     2 low z                       5 high z
 
-Empty slots have an inverted box and are never entered. Triangles are stored in leaf order, ``TRIANGLE_TEXELS`` texels each:
-three corners, the first one's w is 1 where the leaf ends.
+Empty slots have an inverted box and are never entered. Triangles are stored in leaf order, ``TRIANGLE_TEXELS`` texels
+each: three corners, the first one's w is 1 where the leaf ends.
 """
 
 from __future__ import annotations
@@ -72,8 +73,13 @@ def _morton_codes(points: np.ndarray) -> np.ndarray:
     low = points.min(axis=0)
     extent = float((points.max(axis=0) - low).max()) or 1.0
     cells = ((points - low) * (2097151.0 / extent)).astype(np.uint64)
-    for shift, mask in ((32, 0x1F00000000FFFF), (16, 0x1F0000FF0000FF), (8, 0x100F00F00F00F00F),
-                        (4, 0x10C30C30C30C30C3), (2, 0x1249249249249249)):
+    for shift, mask in (
+        (32, 0x1F00000000FFFF),
+        (16, 0x1F0000FF0000FF),
+        (8, 0x100F00F00F00F00F),
+        (4, 0x10C30C30C30C30C3),
+        (2, 0x1249249249249249),
+    ):
         cells = (cells | (cells << np.uint64(shift))) & np.uint64(mask)
     return cells[:, 0] | (cells[:, 1] << np.uint64(1)) | (cells[:, 2] << np.uint64(2))
 
@@ -82,8 +88,12 @@ def _merge(low: np.ndarray, high: np.ndarray) -> _BinaryTree:
     """Merges clusters pairwise until one is left. ``low``, ``high``: (3, T) boxes in Morton order."""
     count = low.shape[1]
     tree = _BinaryTree(
-        np.empty((3, 2 * count - 1), np.float32), np.empty((3, 2 * count - 1), np.float32),
-        np.full(2 * count - 1, -1, np.int64), np.full(2 * count - 1, -1, np.int64), [])
+        np.empty((3, 2 * count - 1), np.float32),
+        np.empty((3, 2 * count - 1), np.float32),
+        np.full(2 * count - 1, -1, np.int64),
+        np.full(2 * count - 1, -1, np.int64),
+        [],
+    )
     tree.low[:, :count], tree.high[:, :count] = low, high
     nodes = np.arange(count)
     made = count

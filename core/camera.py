@@ -16,8 +16,8 @@ from .field import Field
 class Camera:
     """World position and the axes of the image.
 
-    ``right`` and ``up`` reach from the image's centre to its edges at distance 1 along the unit vector ``forward``; for an orthographic
-    camera they are half the image's size in metres.
+    ``right`` and ``up`` reach from the image's centre to its edges at distance 1 along the unit vector ``forward``;
+    for an orthographic camera they are half the image's size in metres.
     """
 
     position: np.ndarray
@@ -41,10 +41,11 @@ def look(position, target, aspect: float, half_angle: float = 0.6) -> Camera:
 
 
 def suggest(field: Field, aspect: float) -> Camera:
-    """A view for scenes without a camera: from an active probe that is well lit and sees far towards the volume's centre.
+    """A view for scenes without a camera: from an active probe that is well lit and sees far towards the volume's
+    centre.
 
-    Depth statistics and light of the field are all it asks. A place near the edge of the volume, at half its height, under
-    a roof rather than under the sky, is preferred: there one stands in a room and overlooks it.
+    Depth statistics and light of the field are all it asks. A place near the edge of the volume, at half its height,
+    under a roof rather than under the sky, is preferred: there one stands in a room and overlooks it.
     """
     active = np.flatnonzero(field.state == ACTIVE)
     texel = (np.indices((DEPTH_EDGE, DEPTH_EDGE))[::-1].reshape(2, -1).T + 0.5) * 2 / DEPTH_EDGE - 1
@@ -60,8 +61,13 @@ def suggest(field: Field, aspect: float) -> Camera:
     ahead = (lobe * depth).sum(axis=1) / lobe.sum(axis=1)
     above = depth[:, directions[:, 2] > 0.7].mean(axis=1)
     light = field.coefficients[active, 0] @ LUMINANCE
-    score = (_share(ahead) - 0.5 * _share(above) + 0.3 * _share(length[:, 0]) - 0.5 * _share(height)
-             + np.minimum(light / max(np.percentile(light, 75), 1e-30), 1.0))
+    score = (
+        _share(ahead)
+        - 0.5 * _share(above)
+        + 0.3 * _share(length[:, 0])
+        - 0.5 * _share(height)
+        + np.minimum(light / max(np.percentile(light, 75), 1e-30), 1.0)
+    )
     best = int(np.argmax(score))
     return look(positions[best], positions[best] + toward[best] - [0, 0, 0.08], aspect, half_angle=0.8)
 

@@ -4,8 +4,8 @@
 World space is Blender's: right-handed, Z up, metres. Light is linear RGB radiance. Spherical harmonics are real and
 orthonormal, without the Condon-Shortley phase, ordered l(l+1)+m.
 
-Cube faces, seen from the probe. A face point is ``forward + s·right + t·up`` with s, t in −1..1; texel column grows with s,
-row with t, texel centres at half-integers::
+Cube faces, seen from the probe. A face point is ``forward + s·right + t·up`` with s, t in −1..1; texel column grows
+with s, row with t, texel centres at half-integers::
 
     face  forward  right  up             +t
      0      +X      −Y    +Z              ^

@@ -27,7 +27,8 @@ def texel_directions(face: int) -> np.ndarray:
 
 
 def texel_place_directions(texels: np.ndarray, places: np.ndarray, face: int) -> np.ndarray:
-    """(N, 3) unit directions through ``places`` (N, 2; column, row in 0..1) of ``texels`` (N,), counted face by face, row by row."""
+    """(N, 3) unit directions through ``places`` (N, 2; column, row in 0..1) of ``texels`` (N,), counted face by face,
+    row by row."""
     index, rest = np.divmod(texels, face * face)
     row, column = np.divmod(rest, face)
     s, t = (np.stack([column, row]) + np.asarray(places, float).T) * 2.0 / face - 1.0

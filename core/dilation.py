@@ -13,8 +13,8 @@ _SWEEPS = 64
 def fill(grid: Grid, coefficients: np.ndarray, active: np.ndarray) -> np.ndarray:
     """Coefficients (P, K, 3) with inactive nodes filled from the active ones, ``active`` (P,) bool.
 
-    Filled nodes solve Laplace's equation between active ones (each the mean of its neighbours along the axes): the smoothest light
-    that agrees with what was baked. Without any active node everything stays as it is.
+    Filled nodes solve Laplace's equation between active ones (each the mean of its neighbours along the axes): the
+    smoothest light that agrees with what was baked. Without any active node everything stays as it is.
     """
     if active.all() or not active.any():
         return coefficients

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Direct light of Blender's lights at a diffuse surface: the readable twin of gpu_shaders/glsl/direct_light_lib.glsl.
 
-Units are those of ``core.snapshot.Light``; they are Blender's (Cycles manual, "Light Settings", and its source). Every light is an
-emitter of radiance L seen under a solid angle: irradiance is E = ∫ L cos θ dω, estimated as the mean over samples of
-(L · dω of the whole light as seen in the sample's direction) · cos θ · visible.
+Units are those of ``core.snapshot.Light``; they are Blender's (Cycles manual, "Light Settings", and its source). Every
+light is an emitter of radiance L seen under a solid angle: irradiance is E = ∫ L cos θ dω, estimated as the mean over
+samples of (L · dω of the whole light as seen in the sample's direction) · cos θ · visible.
 
 N points, M light samples, float64.
 """
@@ -20,7 +20,9 @@ from .snapshot import Light
 Visible = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """(origins (M, 3), unit directions (M, 3), distances (M,)) -> (M,) bool: nothing lies nearer than the distance."""
 
-_FULL_SPREAD = np.pi - 1e-4  # radians; from here on an area light's grid is taken as absent, as Blender's slider ends at 180°
+_FULL_SPREAD = (
+    np.pi - 1e-4
+)  # radians; from here on an area light's grid is taken as absent, as Blender's slider ends at 180°
 _LEAST_HALF_SPREAD = 1e-3  # radians
 _LEAST_BLEND = 1e-6  # of a spot's soft edge, in cosine
 _SHADOW_END = 0.9999  # of the distance to the light: the light's own surface casts no shadow
@@ -35,12 +37,14 @@ class LightSamples:
     irradiance: np.ndarray  # (N, 3) per unit cosine at the surface
 
 
-def irradiance(light: Light, points: np.ndarray, origins: np.ndarray, normals: np.ndarray, u: np.ndarray,
-               visible: Visible) -> np.ndarray:
-    """(N, 3) irradiance of ``light`` at ``points`` (N, 3) with unit ``normals`` (N, 3), world metres, by one sample each.
+def irradiance(
+    light: Light, points: np.ndarray, origins: np.ndarray, normals: np.ndarray, u: np.ndarray, visible: Visible
+) -> np.ndarray:
+    """(N, 3) irradiance of ``light`` at ``points`` (N, 3) with unit ``normals`` (N, 3), world metres, by one sample
+    each.
 
-    ``u`` (N, 2) in [0, 1) picks the place on the light; the mean over many is the irradiance, one is exact where the light has no
-    extent. Shadow rays start at ``origins`` (N, 3), the points stepped off their surface.
+    ``u`` (N, 2) in [0, 1) picks the place on the light; the mean over many is the irradiance, one is exact where the
+    light has no extent. Shadow rays start at ``origins`` (N, 3), the points stepped off their surface.
     """
     sample = sample_light(light, points, u)
     cosine = np.einsum("ni,ni->n", sample.directions, normals)
@@ -64,8 +68,8 @@ def sample_light(light: Light, points: np.ndarray, u: np.ndarray) -> LightSample
 
 
 def _sample_sun(light: Light, u: np.ndarray) -> LightSamples:
-    """Uniform in the cone of half the apparent angle α. Its radiance is strength/(π sin² α), so that a facing surface gets exactly
-    the strength: ∫ cos θ dω over the cone is π sin² α. Times the cone's solid angle 2π(1 − cos α) that is
+    """Uniform in the cone of half the apparent angle α. Its radiance is strength/(π sin² α), so that a facing surface
+    gets exactly the strength: ∫ cos θ dω over the cone is π sin² α. Times the cone's solid angle 2π(1 − cos α) that is
     strength · 2/(1 + cos α).
     """
     back = np.asarray(light.matrix, float)[:3, 2]
@@ -78,8 +82,8 @@ def _sample_sun(light: Light, u: np.ndarray) -> LightSamples:
 def _sample_area(light: Light, points: np.ndarray, u: np.ndarray) -> LightSamples:
     """Uniform on the face of radiance L: dω = cos θ_light · area / distance². The face shines along −back only.
 
-    Spread below 180° puts a grid in front: the share of the face that is seen at the angle θ falls linearly in tan θ to zero at
-    half the spread and is normalised so that total power stays (Cycles, ``area_light_spread_attenuation``).
+    Spread below 180° puts a grid in front: the share of the face that is seen at the angle θ falls linearly in tan θ
+    to zero at half the spread and is normalised so that total power stays (Cycles, ``area_light_spread_attenuation``).
     """
     matrix = np.asarray(light.matrix, float)
     right, up, back, centre = matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3]
@@ -132,11 +136,13 @@ def _sample_point(light: Light, points: np.ndarray, u: np.ndarray) -> LightSampl
     return LightSamples(
         np.where(inside[:, None], to_disk / disk_distance[:, None], directions),
         np.where(inside, disk_distance, centre_distance * cosine - depth),
-        factor[:, None] * colour)
+        factor[:, None] * colour,
+    )
 
 
 def spot_mask(light: Light, directions: np.ndarray) -> np.ndarray:
-    """(N,) share of a spot's light sent against ``directions`` (N, 3): smoothstep in the cosine, 1 inside, 0 outside the cone.
+    """(N,) share of a spot's light sent against ``directions`` (N, 3): smoothstep in the cosine, 1 inside, 0 outside
+    the cone.
 
     The cone lives in the object's own frame, so the object's scale stretches it.
     """
@@ -150,7 +156,8 @@ def spot_mask(light: Light, directions: np.ndarray) -> np.ndarray:
 
 
 def tangent_frame(n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors perpendicular to each of ``n`` (N, 3): Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 2017."""
+    """Two unit vectors perpendicular to each of ``n`` (N, 3): Duff et al., "Building an Orthonormal Basis, Revisited",
+    JCGT 2017."""
     x, y, z = n.T
     s = np.where(z >= 0, 1.0, -1.0)
     a = -1.0 / (s + z)
@@ -165,8 +172,11 @@ def _on_disk(u: np.ndarray) -> np.ndarray:
 
 
 def _in_cone(axis: np.ndarray, one_minus_cos: np.ndarray | float, u: np.ndarray) -> np.ndarray:
-    """(N, 3) directions spread evenly over the cones around ``axis`` (N, 3) whose half angles have the cosine 1 − ``one_minus_cos``."""
+    """(N, 3) directions spread evenly over the cones around ``axis`` (N, 3) whose half angles have the cosine 1 −
+    ``one_minus_cos``."""
     tangent, bitangent = tangent_frame(axis)
     cosine = 1.0 - u[:, 0] * one_minus_cos
     sine, angle = np.sqrt(np.maximum(1 - cosine * cosine, 0)), 2 * np.pi * u[:, 1]
-    return (cosine[:, None] * axis + (sine * np.cos(angle))[:, None] * tangent + (sine * np.sin(angle))[:, None] * bitangent)
+    return (
+        cosine[:, None] * axis + (sine * np.cos(angle))[:, None] * tangent + (sine * np.sin(angle))[:, None] * bitangent
+    )

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Emissive surfaces that are sampled like lights, because the grid cannot resolve them.
 
-The field carries light of emissive surfaces from probe to probe as well as its cells are fine: a luminous ceiling is carried
-exactly, a lamp smaller than a cell is smeared over it, and a wall right beside the lamp gets a fraction of its light.
-Emitters smaller than a cell are therefore sampled: as lights at texel surfaces, and as extra directions in the probes themselves,
-where one ray per texel may miss them.
+The field carries light of emissive surfaces from probe to probe as well as its cells are fine: a luminous ceiling is
+carried exactly, a lamp smaller than a cell is smeared over it, and a wall right beside the lamp gets a fraction of its
+light. Emitters smaller than a cell are therefore sampled: as lights at texel surfaces, and as extra directions in the
+probes themselves, where one ray per texel may miss them.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ _MOST_AREA_SHARE = 0.25  # of all surface: a scene that glows all over is resolv
 def sampling_density(snapshot: SceneSnapshot, grid: Grid) -> np.ndarray:
     """(T,) probability density per m² with which a point on each triangle is chosen as a light sample; integrates to 1.
 
-    Proportional to luminance of the emission; 0 everywhere where nothing is sampled. An object's emission is sampled when the area that
-    glows is no larger than the square of a cell's diagonal.
+    Proportional to luminance of the emission; 0 everywhere where nothing is sampled. An object's emission is sampled
+    when the area that glows is no larger than the square of a cell's diagonal.
     """
     luminance = _luminance(snapshot)[snapshot.material_index]
     density = np.zeros(len(snapshot.triangles))

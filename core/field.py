@@ -15,9 +15,9 @@ from .grid import Grid
 class Field:
     """Radiance SH of all probes of one grid, with what a lookup needs. P = ``grid.count``, flat node order.
 
-    ``offset`` is the displacement of the capture position from the node in metres. ``depth`` holds mean and mean square of the
-    distance to the nearest surface in an octahedral map (row-major, DEPTH_EDGE² texels) in metres and metres².
-    ``metadata`` is the JSON part of the probe file.
+    ``offset`` is the displacement of the capture position from the node in metres. ``depth`` holds mean and mean
+    square of the distance to the nearest surface in an octahedral map (row-major, DEPTH_EDGE² texels) in metres and
+    metres². ``metadata`` is the JSON part of the probe file.
     """
 
     grid: Grid

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A grid of probe nodes in an oriented box.
 
-Node (i, j, k) sits at min + (i/(nx−1), j/(ny−1), k/(nz−1))·(max−min) in the box's own frame −1..1, which ``matrix`` maps to
-the world; a count of 1 puts the node in the middle. The flat index of a node is i + nx·(j + ny·k).
+Node (i, j, k) sits at min + (i/(nx−1), j/(ny−1), k/(nz−1))·(max−min) in the box's own frame −1..1, which ``matrix``
+maps to the world; a count of 1 puts the node in the middle. The flat index of a node is i + nx·(j + ny·k).
 """
 
 from __future__ import annotations
@@ -39,8 +39,9 @@ class Grid:
         lengths = np.linalg.norm(axes, axis=0)
         for axis, count in enumerate(self.resolution):
             if count > 1 and lengths[axis] <= 0:
-                raise InputError(f"{self.name}: zero size along {'XYZ'[axis]} with {count} probes; "
-                                 "give it an extent or a count of 1")
+                raise InputError(
+                    f"{self.name}: zero size along {'XYZ'[axis]} with {count} probes; give it an extent or a count of 1"
+                )
         flat = abs(np.linalg.det(axes / np.where(lengths > 0, lengths, 1))) < 1e-9
         if flat or not lengths.all():
             raise InputError(f"{self.name}: its box has no volume; scale it along every axis")

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Looking up images: the readable twin of ``sample_image`` in gpu_shaders/glsl/surface_lib.glsl.
 
-Bilinear in one mip level, the one whose texel comes nearest to the sampled area. Texels are half floats, as the GPU stores them.
+Bilinear in one mip level, the one whose texel comes nearest to the sampled area. Texels are half floats, as the GPU
+stores them.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ def mip_level(image: Image, footprint: np.ndarray) -> np.ndarray:
 
 
 def smaller(pixels: np.ndarray) -> np.ndarray:
-    """The next mip level of ``pixels`` (H, W, 4): an even share of rows and columns averaged into each texel, sizes halved and
-    rounded down."""
+    """The next mip level of ``pixels`` (H, W, 4): an even share of rows and columns averaged into each texel, sizes
+    halved and rounded down."""
     height, width = (max(size // 2, 1) for size in pixels.shape[:2])
     result = np.empty((height, width, 4))
     for row in range(height):
@@ -40,7 +41,9 @@ def sample_image(image: Image, uv: np.ndarray, footprint: np.ndarray) -> np.ndar
     pixels = np.asarray(image.pixels, float)
     for level in range(levels.max(initial=0) + 1):
         here = levels == level
-        result[here] = _bilinear(np.minimum(pixels, HALF_MAX).astype(np.float16).astype(float), uv[here], image.extension)
+        result[here] = _bilinear(
+            np.minimum(pixels, HALF_MAX).astype(np.float16).astype(float), uv[here], image.extension
+        )
         pixels = smaller(pixels)
     if image.extension == "CLIP":
         result[(uv.min(axis=1) < 0) | (uv.max(axis=1) > 1)] = 0

@@ -2,9 +2,10 @@
 """The field's lookup, readable and slow: what iterations, preview, ``eval`` and exporters agree on.
 
 Irradiance at a point is the trilinear blend of the eight probes around it, each weighted by whether it sees the point
-(Chebyshev's inequality on the depth moments of its octahedral map; Donnelly and Lauritzen, I3D 2006; Majercik et al., JCGT 2019). There is no
-weight for the surface's orientation: it would bend the interpolation in open space, and a probe behind a wall is
-already found by its depth. Culled probes hang in free air, have no statistics and count as seen. Points outside the box are clamped to it. GLSL twin: lookup_lib.glsl and field_lib.glsl.
+(Chebyshev's inequality on the depth moments of its octahedral map; Donnelly and Lauritzen, I3D 2006; Majercik et al.,
+JCGT 2019). There is no weight for the surface's orientation: it would bend the interpolation in open space, and a
+probe behind a wall is already found by its depth. Culled probes hang in free air, have no statistics and count as
+seen. Points outside the box are clamped to it. GLSL twin: lookup_lib.glsl and field_lib.glsl.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ def depth_clamp(grid: Grid) -> float:
 
 
 def visibility_bias(grid: Grid) -> float:
-    """Metres that a surface point is moved along its normal before it is tested, so that its own surface does not hide it."""
+    """Metres that a surface point is moved along its normal before it is tested, so that its own surface does not hide
+    it."""
     return 0.1 * float(grid.cell_size().min())
 
 
@@ -49,7 +51,8 @@ def grid_info(grid: Grid) -> np.ndarray:
 
 
 def lookup_weights(field: Field, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes (N, 8) and weights (N, 8), summing to 1, that make up the field at ``points`` (N, 3) with ``normals`` (N, 3)."""
+    """Nodes (N, 8) and weights (N, 8), summing to 1, that make up the field at ``points`` (N, 3) with ``normals`` (N,
+    3)."""
     grid = field.grid
     resolution = np.array(grid.resolution)
     to_lattice = grid.world_to_lattice()
@@ -94,7 +97,8 @@ def irradiance(field: Field, points: np.ndarray, normals: np.ndarray) -> np.ndar
 
 
 def _sample_moments(depth: np.ndarray, nodes: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """(…, 2) bilinear sample of octahedral ``depth`` (P, DEPTH_EDGE², 2) of ``nodes`` (…) along ``directions`` (…, 3)."""
+    """(…, 2) bilinear sample of octahedral ``depth`` (P, DEPTH_EDGE², 2) of ``nodes`` (…) along ``directions`` (…,
+    3)."""
     position = (octahedral_encode(directions) * 0.5 + 0.5) * DEPTH_EDGE - 0.5
     corner = np.floor(position).astype(int)
     blend = position - corner
@@ -113,5 +117,7 @@ def _wrap_octahedral(texel: np.ndarray) -> np.ndarray:
         value = texel[..., axis]
         past = (value < 0) | (value >= DEPTH_EDGE)
         texel[..., 1 - axis] = np.where(past, DEPTH_EDGE - 1 - texel[..., 1 - axis], texel[..., 1 - axis])
-        texel[..., axis] = np.where(value < 0, -1 - value, np.where(value >= DEPTH_EDGE, 2 * DEPTH_EDGE - 1 - value, value))
+        texel[..., axis] = np.where(
+            value < 0, -1 - value, np.where(value >= DEPTH_EDGE, 2 * DEPTH_EDGE - 1 - value, value)
+        )
     return texel

@@ -10,8 +10,9 @@ With m the measured and r the reference values, N points, each with K values (no
     percentile 95     = 95th percentile of e_i
     worst             = max e_i, at the point ``worst_index``
 
-Everything is divided by the one R, never point by point: a dark corner must not turn a harmless difference into a large error.
-A reference that is rendered twice with different seeds, a and b, and used as their mean carries an error of its own,
+Everything is divided by the one R, never point by point: a dark corner must not turn a harmless difference into a
+large error. A reference that is rendered twice with different seeds, a and b, and used as their mean carries an error
+of its own,
 
     noise             = √ mean (a − b)² / (2 R)
 
@@ -27,7 +28,8 @@ import numpy as np
 
 @dataclass(frozen=True)
 class ErrorFigures:
-    """Errors relative to the RMS of the reference; see the module for the formulas. ``scale`` is that RMS, in the values' unit."""
+    """Errors relative to the RMS of the reference; see the module for the formulas. ``scale`` is that RMS, in the
+    values' unit."""
 
     relative_rms: float
     bias: float
@@ -73,7 +75,8 @@ def compare(measured: np.ndarray, reference: np.ndarray, scale: float | None = N
 
 
 def noise_of_mean(first: np.ndarray, second: np.ndarray) -> float:
-    """Relative RMS error of the mean of two independent renders of the same values; 0 where both are zero everywhere."""
+    """Relative RMS error of the mean of two independent renders of the same values; 0 where both are zero
+    everywhere."""
     first, second = np.asarray(first, float), np.asarray(second, float)
     scale = root_mean_square((first + second) / 2)
     return root_mean_square(first - second) / (2 * scale) if scale > 0 else 0.0

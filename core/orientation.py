@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which objects' back faces are not the inside of a solid.
 
-A room made from a cube primitive is seen from behind by every probe in it, and so is a solid by the probes that are stuck inside; only
-the latter are invalid. What tells them apart is light: it is dark inside a solid, and no window shows the world. Objects whose back
-faces are seen lit, or by probes that also see background, are shells: single walls, rooms with their normals the wrong way round.
+A room made from a cube primitive is seen from behind by every probe in it, and so is a solid by the probes that are
+stuck inside; only the latter are invalid. What tells them apart is light: it is dark inside a solid, and no window
+shows the world. Objects whose back faces are seen lit, or by probes that also see background, are shells: single
+walls, rooms with their normals the wrong way round.
 """
 
 from __future__ import annotations
@@ -16,10 +17,11 @@ _OPEN_SHARE = 0.01  # of a probe's directions that see background: the inside of
 
 
 def inside_solid(shares: np.ndarray) -> np.ndarray:
-    """(S,) bool of probes that are invalid, from shares (S, 4) of the sphere: back faces of solids, background, lit, all back faces.
+    """(S,) bool of probes that are invalid, from shares (S, 4) of the sphere: back faces of solids, background, lit,
+    all back faces.
 
-    Most of what such a probe sees are back faces of solids; or back faces of anything, and neither light nor the world, which others do
-    see: where it is dark everywhere that tells nothing.
+    Most of what such a probe sees are back faces of solids; or back faces of anything, and neither light nor the
+    world, which others do see: where it is dark everywhere that tells nothing.
     """
     solid, background, lit, behind = shares.T
     return (solid > _MOST) | ((behind > _MOST) & (background == 0) & (lit == 0) & lit.any())
@@ -28,7 +30,8 @@ def inside_solid(shares: np.ndarray) -> np.ndarray:
 def flipped_objects(sightings: np.ndarray, object_count: int) -> np.ndarray:
     """Without light to tell, probes vote: objects that most of the probes seeing them see from behind.
 
-    (object_count,) bool from ``sightings`` (P, S): per probe, ±(object + 1) of S directions, negative from behind, 0 nothing."""
+    (object_count,) bool from ``sightings`` (P, S): per probe, ±(object + 1) of S directions, negative from behind, 0
+    nothing."""
     sightings = np.asarray(sightings, np.int64)
     probe = np.broadcast_to(np.arange(len(sightings))[:, None], sightings.shape)
     seen = sightings != 0
@@ -48,8 +51,8 @@ class ShellVote:
         self._any_light = False
 
     def add(self, sightings: np.ndarray) -> None:
-        """``sightings`` (P, S): per probe ±(object + 1) of S directions, negative from behind, half a unit farther from zero where
-        lit; 0 background."""
+        """``sightings`` (P, S): per probe ±(object + 1) of S directions, negative from behind, half a unit farther
+        from zero where lit; 0 background."""
         size = np.abs(sightings)
         behind = sightings < 0
         item = np.floor(size).astype(np.int64) - 1

@@ -32,7 +32,8 @@ class Hits:
 
 @dataclass
 class TraversalCost:
-    """What a traversal did per ray: nodes fetched (N,), triangles tested (N,) and the most entries its stack held (N,)."""
+    """What a traversal did per ray: nodes fetched (N,), triangles tested (N,) and the most entries its stack held
+    (N,)."""
 
     nodes: np.ndarray
     triangles: np.ndarray
@@ -40,11 +41,12 @@ class TraversalCost:
 
 
 def intersect(corners: np.ndarray, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distances (…) and barycentrics (…, 2) of rays (…, 3) against triangles ``corners`` (…, 3, 3); infinite where missed.
+    """Distances (…) and barycentrics (…, 2) of rays (…, 3) against triangles ``corners`` (…, 3, 3); infinite where
+    missed.
 
-    Leading shapes broadcast. Watertight and two-sided: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2013. The
-    triangle is sheared so that the ray runs along +z; the signs of three edge functions, which neighbours compute from the same
-    numbers, decide.
+    Leading shapes broadcast. Watertight and two-sided: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection",
+    JCGT 2013. The triangle is sheared so that the ray runs along +z; the signs of three edge functions, which
+    neighbours compute from the same numbers, decide.
     """
     axis = np.argmax(np.abs(directions), axis=-1)
     x, y, z = (axis + 1) % 3, (axis + 2) % 3, axis
@@ -52,8 +54,9 @@ def intersect(corners: np.ndarray, origins: np.ndarray, directions: np.ndarray) 
     shear_x, shear_y = _component(directions, x) / depth, _component(directions, y) / depth
     a, b, c = (corners[..., i, :] - origins for i in range(3))
     az, bz, cz = (_component(p, z) for p in (a, b, c))
-    (ax, ay), (bx, by), (cx, cy) = ((_component(p, x) - shear_x * pz, _component(p, y) - shear_y * pz)
-                                    for p, pz in ((a, az), (b, bz), (c, cz)))
+    (ax, ay), (bx, by), (cx, cy) = (
+        (_component(p, x) - shear_x * pz, _component(p, y) - shear_y * pz) for p, pz in ((a, az), (b, bz), (c, cz))
+    )
     u, v, w = cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax
     determinant = u + v + w
     inside = (np.minimum(u, np.minimum(v, w)) >= 0) | (np.maximum(u, np.maximum(v, w)) <= 0)
@@ -70,7 +73,9 @@ def _component(vectors: np.ndarray, axis: np.ndarray) -> np.ndarray:
     return np.take_along_axis(vectors, np.broadcast_to(axis, shape)[..., None], -1)[..., 0]
 
 
-def closest_hit(triangles: np.ndarray, origins: np.ndarray, directions: np.ndarray, is_hole: IsHole | None = None) -> Hits:
+def closest_hit(
+    triangles: np.ndarray, origins: np.ndarray, directions: np.ndarray, is_hole: IsHole | None = None
+) -> Hits:
     """Nearest hit of rays ``origins``, ``directions`` (N, 3) among ``triangles`` (T, 3, 3), all pairs tested."""
     count = len(origins)
     hits = Hits(np.full(count, np.inf), np.full(count, -1), np.zeros((count, 2)))
@@ -91,8 +96,13 @@ def closest_hit(triangles: np.ndarray, origins: np.ndarray, directions: np.ndarr
     return hits
 
 
-def any_hit(triangles: np.ndarray, origins: np.ndarray, directions: np.ndarray, limits: np.ndarray,
-            is_hole: IsHole | None = None) -> np.ndarray:
+def any_hit(
+    triangles: np.ndarray,
+    origins: np.ndarray,
+    directions: np.ndarray,
+    limits: np.ndarray,
+    is_hole: IsHole | None = None,
+) -> np.ndarray:
     """(N,) bool: does each ray hit something nearer than its limit?"""
     return closest_hit(triangles, origins, directions, is_hole).distance < limits
 
@@ -100,23 +110,25 @@ def any_hit(triangles: np.ndarray, origins: np.ndarray, directions: np.ndarray, 
 def step_off(points: np.ndarray, normals: np.ndarray, towards: np.ndarray, distances: np.ndarray) -> np.ndarray:
     """(N, 3) starts of secondary rays at hit ``points`` (N, 3), positions relative to the volume's centre.
 
-    The rounding error of a hit grows with its coordinates and with the ``distances`` (N,) of the ray that found it, so the step does
-    too. ``towards`` (N, 3) points back to where that ray came from.
+    The rounding error of a hit grows with its coordinates and with the ``distances`` (N,) of the ray that found it, so
+    the step does too. ``towards`` (N, 3) points back to where that ray came from.
     """
     magnitude = np.maximum(np.abs(points).max(axis=1), distances)
     return points + (normals + towards) * (magnitude * _STEP)[:, None]
 
 
-def traverse(hierarchy: Hierarchy, triangles: np.ndarray, origins: np.ndarray,
-             directions: np.ndarray) -> tuple[Hits, TraversalCost]:
-    """Nearest hits through ``hierarchy``, built of ``triangles`` (T, 3, 3), with children entered nearest first; and the work done.
+def traverse(
+    hierarchy: Hierarchy, triangles: np.ndarray, origins: np.ndarray, directions: np.ndarray
+) -> tuple[Hits, TraversalCost]:
+    """Nearest hits through ``hierarchy``, built of ``triangles`` (T, 3, 3), with children entered nearest first; and
+    the work done.
 
-    Every ray takes one step (a node or a leaf) per round, on a stack of ``hierarchy.stack_size`` entries as in the shader.
-    ``Hits.triangle`` counts as in ``triangles``, not in leaf order.
+    Every ray takes one step (a node or a leaf) per round, on a stack of ``hierarchy.stack_size`` entries as in the
+    shader. ``Hits.triangle`` counts as in ``triangles``, not in leaf order.
     """
     count = len(origins)
     corners = np.asarray(triangles, float)[hierarchy.order]
-    boxes = hierarchy.nodes[:, :NODE_TEXELS - 1].reshape(-1, 2, 3, WIDTH).astype(float)
+    boxes = hierarchy.nodes[:, : NODE_TEXELS - 1].reshape(-1, 2, 3, WIDTH).astype(float)
     children = hierarchy.nodes[:, NODE_TEXELS - 1].astype(np.int64)
     hits = Hits(np.full(count, np.inf), np.full(count, -1), np.zeros((count, 2)))
     cost = TraversalCost(*(np.zeros(count, np.int64) for _ in range(3)))

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bake, readable and slow: capture → texel surfaces → direct light → iterations → field, in float64 with every ray tested against
-every triangle.
+"""The bake, readable and slow: capture → texel surfaces → direct light → iterations → field, in float64 with every ray
+tested against every triangle.
 
-Readable twin of the shaders capture_trace_comp, surface_resolve_comp with surface_lib, object_sightings_comp, probe_statistics_comp,
-lookup_weights_comp, direct_light_comp and light_iterate_comp; for scenes of some hundred triangles and a few probes. Two things are
-rounded as the GPU stores them, because no reference could come near otherwise: images and lookup weights are half floats.
+Readable twin of the shaders capture_trace_comp, surface_resolve_comp with surface_lib, object_sightings_comp,
+probe_statistics_comp, lookup_weights_comp, direct_light_comp and light_iterate_comp; for scenes of some hundred
+triangles and a few probes. Two things are rounded as the GPU stores them, because no reference could come near
+otherwise: images and lookup weights are half floats.
 
 Texels of a probe count face by face, row by row: X = 6·face². P probes.
 """
@@ -32,8 +33,8 @@ from .world_map import world_texels
 
 @dataclass
 class TexelSurfaces:
-    """What the texels of P probes see; see surface_resolve_comp.glsl. ``distance`` is infinite where a texel sees background,
-    whose radiance is then in ``emission``."""
+    """What the texels of P probes see; see surface_resolve_comp.glsl. ``distance`` is infinite where a texel sees
+    background, whose radiance is then in ``emission``."""
 
     distance: np.ndarray  # (P, X) metres
     triangle: np.ndarray  # (P, X) int, −1 background
@@ -46,8 +47,9 @@ class TexelSurfaces:
 class ReferenceBake:
     """One bake of ``snapshot`` into ``grid``, stage by stage, so that tests can compare each with the GPU's.
 
-    ``nodes`` (S,) are the grid nodes that capture; ``capture`` comes first, then ``source``, ``field_statistics`` and ``iterate``.
-    ``offset`` (grid.count, 3) metres are moves of probes out of walls, which the reference takes as given (core/relocation.py).
+    ``nodes`` (S,) are the grid nodes that capture; ``capture`` comes first, then ``source``, ``field_statistics`` and
+    ``iterate``. ``offset`` (grid.count, 3) metres are moves of probes out of walls, which the reference takes as given
+    (core/relocation.py).
     """
 
     def __init__(self, snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, offset: np.ndarray | None = None):
@@ -63,7 +65,8 @@ class ReferenceBake:
         clips = np.array([material.alpha_threshold > 0 for material in snapshot.materials])
         self._clipped = clips[snapshot.material_index]
 
-    # Capture ----------------------------------------------------------------------------------------------------------------
+    # Capture
+    # ----------------------------------------------------------------------------------------------------------------
 
     def capture(self) -> TexelSurfaces:
         """Texel surfaces of all probes."""
@@ -81,7 +84,8 @@ class ReferenceBake:
         return self.is_hole if self._clipped.any() else None
 
     def is_hole(self, triangle: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
-        """(K,) bool: is the material of ``triangle`` (K,) clipped away at ``barycentric`` (K, 2)? Images at full resolution."""
+        """(K,) bool: is the material of ``triangle`` (K,) clipped away at ``barycentric`` (K, 2)? Images at full
+        resolution."""
         hole = np.zeros(len(triangle), bool)
         for index, material in enumerate(self.snapshot.materials):
             here = np.flatnonzero((self.snapshot.material_index[triangle] == index) & self._clipped[triangle])
@@ -96,7 +100,9 @@ class ReferenceBake:
     def _resolve(self, hits: rays.Hits, origins: np.ndarray, directions: np.ndarray) -> TexelSurfaces:
         """Surfaces of rays (N,); fields of rays that hit nothing are zero."""
         count = len(origins)
-        surfaces = TexelSurfaces(hits.distance, hits.triangle, np.zeros(count, bool), *(np.zeros((count, 3)) for _ in range(3)))
+        surfaces = TexelSurfaces(
+            hits.distance, hits.triangle, np.zeros(count, bool), *(np.zeros((count, 3)) for _ in range(3))
+        )
         hit = np.flatnonzero(hits.triangle >= 0)
         triangle, barycentric, direction = hits.triangle[hit], hits.barycentric[hit], directions[hit]
         corners = self.triangles[triangle]
@@ -108,7 +114,8 @@ class ReferenceBake:
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         surfaces.normal[hit] = np.where(facing[:, None] > 0, -normal, normal)
 
-        # Width of what a texel covers on the surface, in uv: distance × angle, stretched by the slant, × uv units per metre.
+        # Width of what a texel covers on the surface, in uv: distance × angle, stretched by the slant, × uv units per
+        # metre.
         area = np.linalg.norm(geometric, axis=1)
         uv = _interpolate(self.snapshot.corner_uvs[triangle], barycentric)
         slant = np.maximum(np.abs(facing) / area, 0.1)
@@ -120,7 +127,9 @@ class ReferenceBake:
             if material.base_image != NO_IMAGE:
                 albedo *= sample_image(self.snapshot.images[material.base_image], uv[here], footprint[here])[:, :3]
             if material.emission_image != NO_IMAGE:
-                emission *= sample_image(self.snapshot.images[material.emission_image], uv[here], footprint[here])[:, :3]
+                emission *= sample_image(self.snapshot.images[material.emission_image], uv[here], footprint[here])[
+                    :, :3
+                ]
             surfaces.albedo[hit[here]], surfaces.emission[hit[here]] = albedo, emission
         return surfaces
 
@@ -131,10 +140,12 @@ class ReferenceBake:
         uv_area = np.abs(np.linalg.det(uv_edge))
         return np.sqrt(uv_area / np.maximum(np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1), 1e-30))
 
-    # Statistics -------------------------------------------------------------------------------------------------------------
+    # Statistics
+    # -------------------------------------------------------------------------------------------------------------
 
     def shells(self, surfaces: TexelSurfaces, source: np.ndarray) -> np.ndarray:
-        """(objects,) bool: whose back faces are not the inside of a solid, by 8×8 texels of each face, see core/orientation.py."""
+        """(objects,) bool: whose back faces are not the inside of a solid, by 8×8 texels of each face, see
+        core/orientation.py."""
         face = self.settings.face
         at = (2 * np.arange(8) + 1) * face // 16
         index = ((np.arange(6)[:, None, None] * face + at[:, None]) * face + at).ravel()
@@ -154,10 +165,13 @@ class ReferenceBake:
         return np.stack([seen @ self.solid_angles for seen in (solid, background, lit, back)], axis=1) / (4 * np.pi)
 
     def depth_moments(self, surfaces: TexelSurfaces) -> np.ndarray:
-        """(P, DEPTH_EDGE², 2) mean and mean square of clamped distance, 16 directions over one and a half texels each."""
+        """(P, DEPTH_EDGE², 2) mean and mean square of clamped distance, 16 directions over one and a half texels
+        each."""
         step = (np.arange(4) - 1.5) * 0.375
         column, row = np.meshgrid(np.arange(DEPTH_EDGE), np.arange(DEPTH_EDGE))
-        place = np.stack(np.broadcast_arrays(column[..., None, None] + 0.5 + step, row[..., None, None] + 0.5 + step[:, None]), -1)
+        place = np.stack(
+            np.broadcast_arrays(column[..., None, None] + 0.5 + step, row[..., None, None] + 0.5 + step[:, None]), -1
+        )
         uv = place.reshape(DEPTH_EDGE**2, 16, 2) * (2.0 / DEPTH_EDGE) - 1.0
         for axis in (0, 1):  # past the edge of the map the sphere goes on where the edge is mirrored to
             past = np.abs(uv[..., axis]) > 1
@@ -179,7 +193,8 @@ class ReferenceBake:
         field.offset[:] = self.offset
         return field
 
-    # Light ------------------------------------------------------------------------------------------------------------------
+    # Light
+    # ------------------------------------------------------------------------------------------------------------------
 
     def points(self, surfaces: TexelSurfaces) -> np.ndarray:
         """(P, X, 3) hit points relative to the grid's centre; the probe's own position for background."""
@@ -187,7 +202,8 @@ class ReferenceBake:
         return self.positions[:, None] + self.directions * distance[..., None]
 
     def source(self, surfaces: TexelSurfaces) -> np.ndarray:
-        """(P, X, 3) emission plus reflected direct light of all lights, each sample at another place of the texel's footprint."""
+        """(P, X, 3) emission plus reflected direct light of all lights, each sample at another place of the texel's
+        footprint."""
         probe, texel = np.nonzero((surfaces.triangle >= 0) & surfaces.albedo.any(axis=2))
         normals = surfaces.normal[probe, texel]
         incoming = np.zeros((len(probe), 3))
@@ -197,24 +213,47 @@ class ReferenceBake:
             origins = rays.step_off(points, normals, -directions, distances)
             for number, light in enumerate(self.snapshot.lights):
                 u = sample_r2(texel_keys(self.nodes[probe], texel, light_stream(number), self.settings.seed), index)
-                incoming += light_irradiance(light, points + self.grid.center, origins, normals, u.astype(float), self._visible)
+                incoming += light_irradiance(
+                    light, points + self.grid.center, origins, normals, u.astype(float), self._visible
+                )
         source = surfaces.emission.copy()
         source[probe, texel] += surfaces.albedo[probe, texel] / np.pi * incoming / self.settings.samples
         return source
 
     def _look_at_place(self, surfaces: TexelSurfaces, probe: np.ndarray, texel: np.ndarray, index: int):
-        """Directions (N, 3) and distances (N,) of sample ``index`` on the planes of the texels' surfaces; the centre where a single
-        sample is taken or the plane is seen edge-on."""
+        """Directions (N, 3) and distances (N,) of sample ``index`` on the planes of the texels' surfaces; the centre
+        where a single sample is taken, the surface is not flat or the plane is seen edge-on."""
         centre, distance = self.directions[texel], surfaces.distance[probe, texel]
         if self.settings.samples == 1:
             return centre, distance
+        is_flat = self._lies_flat(surfaces)[probe, texel]
         place = sample_r2(texel_keys(self.nodes[probe], texel, PLACE_STREAM, self.settings.seed), index).astype(float)
         moved = texel_place_directions(texel, place, self.settings.face)
         normals = surfaces.normal[probe, texel]
         with np.errstate(divide="ignore"):
             moved_distance = distance * np.einsum("ni,ni->n", centre, normals) / np.einsum("ni,ni->n", moved, normals)
-        usable = (moved_distance > 0.5 * distance) & (moved_distance < 2 * distance)
+        usable = is_flat & (moved_distance > 0.5 * distance) & (moved_distance < 2 * distance)
         return np.where(usable[:, None], moved, centre), np.where(usable, moved_distance, distance)
+
+    def _lies_flat(self, surfaces: TexelSurfaces) -> np.ndarray:
+        """(P, X) bool: do a texel's neighbours on its face lie on its plane?"""
+        face = self.settings.face
+        grid = (len(surfaces.triangle), 6, face, face)
+        seen = (surfaces.triangle >= 0).reshape(grid)
+        distance = np.where(surfaces.triangle >= 0, surfaces.distance, 0.0)
+        point = (self.directions * distance[..., None]).reshape(*grid, 3)
+        normal, distance = surfaces.normal.reshape(*grid, 3), distance.reshape(grid)
+        is_flat = seen.copy()
+        for axis in (2, 3):
+            for step in (1, -1):
+                here = [slice(None)] * 4
+                there = [slice(None)] * 4
+                here[axis], there[axis] = (slice(None, -1), slice(1, None))[::step]
+                here, there = tuple(here), tuple(there)
+                apart = np.abs(np.einsum("...i,...i->...", point[there] - point[here], normal[here]))
+                alike = np.einsum("...i,...i->...", normal[there], normal[here]) >= 0.99
+                is_flat[here] &= seen[there] & alike & (apart <= 0.01 * distance[here])
+        return is_flat.reshape(surfaces.triangle.shape)
 
     def _visible(self, origins: np.ndarray, directions: np.ndarray, limits: np.ndarray) -> np.ndarray:
         return ~rays.any_hit(self.triangles, origins, directions, limits, self._hole_test())
@@ -230,7 +269,8 @@ class ReferenceBake:
     def iterate(self, surfaces: TexelSurfaces, source: np.ndarray, field: Field, lookups) -> np.ndarray:
         """(grid.count, K, 3) next coefficients: outgoing radiance of every texel, projected to SH; other nodes filled.
 
-        Outgoing radiance is source + albedo/π · max(0, irradiance of ``field``); ``lookups`` as returned by ``lookups``.
+        Outgoing radiance is source + albedo/π · max(0, irradiance of ``field``); ``lookups`` as returned by
+        ``lookups``.
         """
         nodes, weights = lookups
         outgoing = source.copy()

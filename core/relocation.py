@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Probes that stand in a wall or behind it are moved out to where the light is (the field's ``offset``).
 
-A volume that reaches into its walls has a layer of nodes that see nothing, while the wall's surface then reads only the next layer inside. A
-probe without light whose nearest surface is close is captured from the other side of that surface, never farther than half a cell from
-its node, so that it stays the nearest probe of its part of the room.
+A volume that reaches into its walls has a layer of nodes that see nothing, while the wall's surface then reads only
+the next layer inside. A probe without light whose nearest surface is close is captured from the other side of that
+surface, never farther than half a cell from its node, so that it stays the nearest probe of its part of the room.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ _OUTWARD_PENALTY = 0.5  # how much farther than inwards the way out of the volum
 
 
 def misplaced(shares: np.ndarray) -> np.ndarray:
-    """(S,) bool of probes worth moving, from shares (S, 4) of back faces of solids, background, lit and all back faces."""
+    """(S,) bool of probes worth moving, from shares (S, 4) of back faces of solids, background, lit and all back
+    faces."""
     dark = shares[:, 2] == 0
     return inside_solid(shares) | (dark & (np.maximum(shares[:, 1], shares[:, 3]) > _LEAST_BEHIND))
 
@@ -28,8 +29,8 @@ def misplaced(shares: np.ndarray) -> np.ndarray:
 def moves(grid: Grid, positions: np.ndarray, exits: np.ndarray) -> np.ndarray:
     """(L, 3) displacement in metres of probes at world ``positions`` (L, 3), 0 where no exit is near enough.
 
-    ``exits`` (L, 6, 4) holds offset and distance of the nearest surface in each cube face. Ways towards the volume's centre are
-    preferred: what lies outside is rarely meant.
+    ``exits`` (L, 6, 4) holds offset and distance of the nearest surface in each cube face. Ways towards the volume's
+    centre are preferred: what lies outside is rarely meant.
     """
     offset, distance = exits[..., :3].astype(float), exits[..., 3].astype(float)
     margin = _MARGIN * float(grid.cell_size().min())

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Seeded numbers of shadow samples: the readable twin of gpu_shaders/glsl/random_lib.glsl.
 
-A number depends on what is sampled (probe, texel, light, sample) and on nothing else, so any split of the work gives the same light.
+A number depends on what is sampled (probe, texel, light, sample) and on nothing else, so any split of the work gives
+the same light.
 """
 
 from __future__ import annotations
@@ -32,17 +33,19 @@ def _mix(v: np.ndarray) -> np.ndarray:
 
 
 def sample_r2(keys: np.ndarray, index: int) -> np.ndarray:
-    """(…, 2) float32 numbers in [0, 1): sample ``index`` of the sequence that belongs to each of ``keys`` (…, 3) uint32.
+    """(…, 2) float32 numbers in [0, 1): sample ``index`` of the sequence that belongs to each of ``keys`` (…, 3)
+    uint32.
 
-    The R2 sequence, two-dimensional and of low discrepancy, shifted by the hash modulo 1 (Cranley and Patterson 1976), in integers
-    whose overflow is the modulo: the shader's numbers to the last bit.
+    The R2 sequence, two-dimensional and of low discrepancy, shifted by the hash modulo 1 (Cranley and Patterson 1976),
+    in integers whose overflow is the modulo: the shader's numbers to the last bit.
     """
     place = pcg3d(keys)[..., :2] + R2_STEP * np.uint32(index)
     return (place >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
 
 
 def texel_keys(nodes: np.ndarray, texels: np.ndarray, stream: int, seed: int) -> np.ndarray:
-    """(…, 3) uint32 keys of the samples that texels (…) of probes at grid ``nodes`` (…) take for one purpose, ``stream``.
+    """(…, 3) uint32 keys of the samples that texels (…) of probes at grid ``nodes`` (…) take for one purpose,
+    ``stream``.
 
     ``texels`` count face by face, row by row.
     """

@@ -56,8 +56,8 @@ class Material:
 class Light:
     """A light object.
 
-    Frame: ``matrix`` columns 0..2 are the orthonormal axes right, up, back (a light shines along −column 2), column 3 the
-    position. ``color`` carries all scale factors (colour × temperature × 2^exposure) so that the units below are
+    Frame: ``matrix`` columns 0..2 are the orthonormal axes right, up, back (a light shines along −column 2), column 3
+    the position. ``color`` carries all scale factors (colour × temperature × 2^exposure) so that the units below are
     complete:
 
     ======  =====================================================  ==============================

@@ -15,9 +15,10 @@ _PEAK = 10.0  # times the map's mean: what is brighter counts as a sun
 def world_texels(world: World, face: int) -> np.ndarray:
     """(6, face, face, 3) mean radiance of the background over each texel.
 
-    A map is averaged into texels by solid angle; pixels larger than a third of a texel are split first. How much of a texel the pixels
-    that fall into it cover is off by some percent, which a mean does not mind but a sun of one pixel would: what stands out of the
-    map is summed and divided by the texel's exact solid angle, so it keeps its energy at any face size.
+    A map is averaged into texels by solid angle; pixels larger than a third of a texel are split first. How much of a
+    texel the pixels that fall into it cover is off by some percent, which a mean does not mind but a sun of one pixel
+    would: what stands out of the map is summed and divided by the texel's exact solid angle, so it keeps its energy at
+    any face size.
     """
     if world.map is None:
         return np.broadcast_to(np.asarray(world.color, float), (6, face, face, 3)).copy()

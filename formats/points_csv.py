@@ -15,7 +15,8 @@ BLOCK_ROWS = 50_000
 
 
 def read_blocks(file, name: str):
-    """Yields (rows as text, values) per block of the open text file ``file``; ``values`` is (N, 6) float64 in that order.
+    """Yields (rows as text, values) per block of the open text file ``file``; ``values`` is (N, 6) float64 in that
+    order.
 
     Blank lines are skipped. Normals come back with unit length.
 

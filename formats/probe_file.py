@@ -10,9 +10,9 @@
     depth.mean.00 … .63         mean distance per octahedral texel, metres
     depth.meansq.00 … .63       mean squared distance, metres²
 
-The text attribute ``gridlight`` is one JSON object: what the channels cannot say (see ``describe``), and ``digest``, the
-SHA-256 of that object without the digest and of all channel bytes, so a damaged file is noticed wherever the damage is.
-A file without ``digest`` is accepted: other programs may write one.
+The text attribute ``gridlight`` is one JSON object: what the channels cannot say (see ``describe``), and ``digest``,
+the SHA-256 of that object without the digest and of all channel bytes, so a damaged file is noticed wherever the
+damage is. A file without ``digest`` is accepted: other programs may write one.
 """
 
 from __future__ import annotations
@@ -62,8 +62,10 @@ def check_size(grid: Grid, bands: int) -> None:
     """Raises InputError where a field of ``grid`` is too large for one file; cheap, made before the long work."""
     size = _pixel_bytes(grid, bands)
     if size > MAX_BYTES:
-        raise InputError(f"{grid.name}: {grid.count} probes need {size >> 20} MiB in one probe file, the limit is "
-                         f"{MAX_BYTES >> 20} MiB; use a lower resolution, fewer bands or several volumes")
+        raise InputError(
+            f"{grid.name}: {grid.count} probes need {size >> 20} MiB in one probe file, the limit is "
+            f"{MAX_BYTES >> 20} MiB; use a lower resolution, fewer bands or several volumes"
+        )
 
 
 def describe(field: Field) -> dict:
@@ -182,8 +184,10 @@ def _check_header(path: str, header: dict) -> tuple[dict, Grid, int]:
     if not (isinstance(version, list) and len(version) == 2 and all(type(part) is int for part in version)):
         raise InputError(f"{path} is damaged: its format version is missing")
     if version[0] > FORMAT_VERSION[0]:
-        raise InputError(f"{path} has format version {version[0]}.{version[1]}, this Gridlight reads up to "
-                         f"{FORMAT_VERSION[0]}; update Gridlight")
+        raise InputError(
+            f"{path} has format version {version[0]}.{version[1]}, this Gridlight reads up to "
+            f"{FORMAT_VERSION[0]}; update Gridlight"
+        )
     grid, bands = _announced_grid(path, document)
     size = _pixel_bytes(grid, bands)
     if size > MAX_BYTES:
@@ -226,8 +230,9 @@ def _gather(path: str, channels: dict, grid: Grid, bands: int) -> np.ndarray:
     for plane, name in zip(planes, channel_names(bands)):
         pixels = channels[name].pixels
         if pixels.dtype != np.float32 or pixels.shape != plane.shape:
-            raise InputError(f"{path} is damaged: channel {name} is {pixels.dtype} {pixels.shape}, "
-                             f"not 32-bit float {plane.shape}")
+            raise InputError(
+                f"{path} is damaged: channel {name} is {pixels.dtype} {pixels.shape}, not 32-bit float {plane.shape}"
+            )
         plane[:] = pixels
     return planes
 
@@ -241,8 +246,10 @@ def _check_values(path: str, document: dict, planes: np.ndarray, bands: int) -> 
         raise InputError(f"{path} is damaged: its probe states are not {CULLED}, {ACTIVE} or {INVALID}")
     digest = document.pop("digest", None)
     if digest is not None and digest != _digest(_json(document), planes):
-        raise InputError(f"{path} does not match its own checksum: it was damaged or edited; bake it again "
-                         "(or remove 'digest' from its 'gridlight' attribute to use it as it is)")
+        raise InputError(
+            f"{path} does not match its own checksum: it was damaged or edited; bake it again "
+            "(or remove 'digest' from its 'gridlight' attribute to use it as it is)"
+        )
 
 
 def _json(document: dict) -> str:

@@ -49,8 +49,9 @@ def _update(digest, value) -> None:
         digest.update(repr(value).encode())
 
 
-def provenance(snapshot: SceneSnapshot, settings: BakeSettings, device: str, iterations: int, converged: bool,
-               warnings: list[str]) -> dict:
+def provenance(
+    snapshot: SceneSnapshot, settings: BakeSettings, device: str, iterations: int, converged: bool, warnings: list[str]
+) -> dict:
     """The metadata of a baked field. Holds no times, so that equal bakes give equal bytes."""
     return {
         "generator": f"Gridlight {program_version()}",

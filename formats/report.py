@@ -29,7 +29,8 @@ _SIX_SIDES = np.concatenate([np.eye(3), -np.eye(3)])
 
 @dataclass
 class VolumeReport:
-    """One baked volume. ``energy`` and ``change`` hold a value per iteration: the field's energy and its relative change."""
+    """One baked volume. ``energy`` and ``change`` hold a value per iteration: the field's energy and its relative
+    change."""
 
     field: Field
     name: str = ""
@@ -84,14 +85,25 @@ def report_html(report: ReportData) -> str:
     script = (_HERE / "report.js").read_text(encoding="utf-8")
     allowed = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{allowed}'"
-    sections = [_header(report), _cards(report), _warnings(report), _pictures(report), _volumes(report), _timings(report),
-                _notes(report), _settings(report), _summary(report)]
-    return (f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-            f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
-            f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-            f"<title>{escape(report.title)} · Gridlight</title>\n<style>\n{style}</style>\n</head>\n<body>\n<main>\n"
-            + "\n".join(section for section in sections if section)
-            + f"\n</main>\n<script>{script}</script>\n</body>\n</html>\n")
+    sections = [
+        _header(report),
+        _cards(report),
+        _warnings(report),
+        _pictures(report),
+        _volumes(report),
+        _timings(report),
+        _notes(report),
+        _settings(report),
+        _summary(report),
+    ]
+    return (
+        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(report.title)} · Gridlight</title>\n<style>\n{style}</style>\n</head>\n<body>\n<main>\n"
+        + "\n".join(section for section in sections if section)
+        + f"\n</main>\n<script>{script}</script>\n</body>\n</html>\n"
+    )
 
 
 def _header(report: ReportData) -> str:
@@ -102,17 +114,28 @@ def _header(report: ReportData) -> str:
 
 def _cards(report: ReportData) -> str:
     cards = []
-    for key, text in (("total", "probes in all"), ("active", "active"), ("culled", "culled, light nothing"),
-                      ("invalid", "invalid, inside solids")):
+    for key, text in (
+        ("total", "probes in all"),
+        ("active", "active"),
+        ("culled", "culled, light nothing"),
+        ("invalid", "invalid, inside solids"),
+    ):
         if key in report.counts:
             cards.append((f"{report.counts[key]:,}".replace(",", " "), text, ""))
     iterations = max((volume.iterations for volume in report.volumes), default=0)
     settled = all(volume.converged for volume in report.volumes)
-    cards.append((str(iterations), "iterations until the light settled" if settled else "iterations, not settled",
-                  "good" if settled else "bad"))
+    cards.append(
+        (
+            str(iterations),
+            "iterations until the light settled" if settled else "iterations, not settled",
+            "good" if settled else "bad",
+        )
+    )
     if "total" in report.seconds:
         cards.append((figures.duration(report.seconds["total"]), "in total", ""))
-    html = "".join(f'<div class="card {kind}"><b>{escape(value)}</b><span>{text}</span></div>' for value, text, kind in cards)
+    html = "".join(
+        f'<div class="card {kind}"><b>{escape(value)}</b><span>{text}</span></div>' for value, text, kind in cards
+    )
     return f'<section class="cards">{html}</section>'
 
 
@@ -128,8 +151,10 @@ def _pictures(report: ReportData) -> str:
     shown = []
     for caption, data in report.images:
         source = f"data:image/png;base64,{base64.b64encode(data).decode()}"
-        shown.append(f'<figure><img src="{source}" alt="{escape(caption, quote=True)}">'
-                     f"<figcaption>{escape(caption)}</figcaption></figure>")
+        shown.append(
+            f'<figure><img src="{source}" alt="{escape(caption, quote=True)}">'
+            f"<figcaption>{escape(caption)}</figcaption></figure>"
+        )
     return f'<section><h2>Pictures</h2><div class="pictures">{"".join(shown)}</div></section>'
 
 
@@ -140,14 +165,16 @@ def _volumes(report: ReportData) -> str:
         shape = " × ".join(map(str, volume.field.grid.resolution))
         cell = " × ".join(figures.number(length) for length in volume.field.grid.cell_size())
         bands = volume.field.bands
-        parts.append(f"<section><h2>{escape(name)}</h2><p>{shape} probes, cells of {cell} m, "
-                     f"{bands} {'band' if bands == 1 else 'bands'} of spherical harmonics.</p>"
-                     f"{_settling(volume, report.settings)}"
-                     f'<h2>The field, level by level</h2><div class="box">{slices_html(volume.field, f"volume{index}")}</div>'
-                     f'<div class="pair" style="margin-top:16px"><div class="box"><h3>How bright the probes are</h3>'
-                     f"{figures.histogram(_mean_irradiance(volume.field), 'Histogram of irradiance', 'W/m²')}"
-                     f"<p class=\"legend\">Active probes by irradiance, mean of six sides.</p></div>"
-                     f'<div class="box"><h3>Numbers</h3>{_numbers(volume.field)}</div></div></section>')
+        parts.append(
+            f"<section><h2>{escape(name)}</h2><p>{shape} probes, cells of {cell} m, "
+            f"{bands} {'band' if bands == 1 else 'bands'} of spherical harmonics.</p>"
+            f"{_settling(volume, report.settings)}"
+            f'<h2>The field, level by level</h2><div class="box">{slices_html(volume.field, f"volume{index}")}</div>'
+            f'<div class="pair" style="margin-top:16px"><div class="box"><h3>How bright the probes are</h3>'
+            f"{figures.histogram(_mean_irradiance(volume.field), 'Histogram of irradiance', 'W/m²')}"
+            f'<p class="legend">Active probes by irradiance, mean of six sides.</p></div>'
+            f'<div class="box"><h3>Numbers</h3>{_numbers(volume.field)}</div></div></section>'
+        )
     return "\n".join(parts)
 
 
@@ -162,10 +189,14 @@ def _settling(volume: VolumeReport, settings: dict) -> str:
     change = ""
     if volume.change:
         first = len(volume.energy) - len(volume.change) + 1
-        change = (f'<div class="box"><h3>Relative change from one iteration to the next</h3>'
-                  f"{figures.curve(volume.change, 'Change per iteration', True, tolerance, label, first)}</div>")
-    return (f'<p>{text}</p><div class="pair"><div class="box"><h3>Energy of the field</h3>'
-            f"{figures.curve(volume.energy, 'Energy per iteration')}</div>{change}</div>{_list(volume.notes)}")
+        change = (
+            f'<div class="box"><h3>Relative change from one iteration to the next</h3>'
+            f"{figures.curve(volume.change, 'Change per iteration', True, tolerance, label, first)}</div>"
+        )
+    return (
+        f'<p>{text}</p><div class="pair"><div class="box"><h3>Energy of the field</h3>'
+        f"{figures.curve(volume.energy, 'Energy per iteration')}</div>{change}</div>{_list(volume.notes)}"
+    )
 
 
 def _mean_irradiance(baked: Field) -> np.ndarray:
@@ -180,10 +211,13 @@ def _numbers(baked: Field) -> str:
     if not len(values):
         return '<p class="empty">no active probe</p>'
     low, median, high = np.percentile(values, (1, 50, 99))
-    rows = {"darkest hundredth below": f"{figures.number(low)} W/m²", "median": f"{figures.number(median)} W/m²",
-            "brightest hundredth above": f"{figures.number(high)} W/m²",
-            "lowest validity of an active probe": figures.number(float(baked.validity[baked.state == ACTIVE].min())),
-            "probes moved out of surfaces": str(int((np.abs(baked.offset).max(axis=1) > 0).sum()))}
+    rows = {
+        "darkest hundredth below": f"{figures.number(low)} W/m²",
+        "median": f"{figures.number(median)} W/m²",
+        "brightest hundredth above": f"{figures.number(high)} W/m²",
+        "lowest validity of an active probe": figures.number(float(baked.validity[baked.state == ACTIVE].min())),
+        "probes moved out of surfaces": str(int((np.abs(baked.offset).max(axis=1) > 0).sum())),
+    }
     return _table(rows)
 
 
@@ -196,7 +230,8 @@ def _timings(report: ReportData) -> str:
 def _notes(report: ReportData) -> str:
     if not report.notes:
         return ""
-    return f'<section><h2>What was chosen automatically, and why</h2><div class="box">{_list(report.notes)}</div></section>'
+    heading = "<h2>What was chosen automatically, and why</h2>"
+    return f'<section>{heading}<div class="box">{_list(report.notes)}</div></section>'
 
 
 def _settings(report: ReportData) -> str:
@@ -217,5 +252,7 @@ def _list(lines: list[str]) -> str:
 
 
 def _table(rows: dict) -> str:
-    body = "".join(f"<tr><th>{escape(str(name))}</th><td>{escape(str(value))}</td></tr>" for name, value in rows.items())
+    body = "".join(
+        f"<tr><th>{escape(str(name))}</th><td>{escape(str(value))}</td></tr>" for name, value in rows.items()
+    )
     return f"<table>{body}</table>"

@@ -29,10 +29,16 @@ def duration(seconds: float) -> str:
     return f"{seconds:.2f} s" if seconds < 120 else f"{seconds / 60:.1f} min"
 
 
-def curve(values: list[float], label: str, logarithmic: bool = False, threshold: float | None = None,
-          threshold_label: str = "", first: int = 1) -> str:
-    """A line over iterations ``first``, first + 1, …; values that are not finite, or not positive on a logarithmic axis,
-    are left out.
+def curve(
+    values: list[float],
+    label: str,
+    logarithmic: bool = False,
+    threshold: float | None = None,
+    threshold_label: str = "",
+    first: int = 1,
+) -> str:
+    """A line over iterations ``first``, first + 1, …; values that are not finite, or not positive on a logarithmic
+    axis, are left out.
 
     ``threshold`` draws a level with its label.
     """
@@ -63,23 +69,33 @@ def curve(values: list[float], label: str, logarithmic: bool = False, threshold:
     parts = [_open(label)]
     for tick, name in zip(ticks, names):
         level = y(10**tick if logarithmic else tick)
-        parts.append(f'<line class="grid" x1="{_LEFT}" x2="{WIDTH - _RIGHT}" y1="{level:.1f}" y2="{level:.1f}"/>'
-                     f'<text x="{_LEFT - 8}" y="{level + 4:.1f}" text-anchor="end">{name}</text>')
+        parts.append(
+            f'<line class="grid" x1="{_LEFT}" x2="{WIDTH - _RIGHT}" y1="{level:.1f}" y2="{level:.1f}"/>'
+            f'<text x="{_LEFT - 8}" y="{level + 4:.1f}" text-anchor="end">{name}</text>'
+        )
     step = max(1, int(np.ceil(len(at) / 12)))
     for iteration in at[::step]:
-        parts.append(f'<text x="{x(iteration):.1f}" y="{HEIGHT - _BOTTOM + 17}" text-anchor="middle">{iteration}</text>')
+        parts.append(
+            f'<text x="{x(iteration):.1f}" y="{HEIGHT - _BOTTOM + 17}" text-anchor="middle">{iteration}</text>'
+        )
     parts.append(f'<text class="axis" x="{(WIDTH + _LEFT) / 2}" y="{HEIGHT - 6}" text-anchor="middle">iteration</text>')
     if threshold and threshold > 0:
         level = y(threshold)
-        parts.append(f'<line class="threshold" x1="{_LEFT}" x2="{WIDTH - _RIGHT}" y1="{level:.1f}" y2="{level:.1f}"/>'
-                     f'<text class="threshold" x="{WIDTH - _RIGHT}" y="{level - 5:.1f}" text-anchor="end">'
-                     f"{escape(threshold_label)}</text>")
+        parts.append(
+            f'<line class="threshold" x1="{_LEFT}" x2="{WIDTH - _RIGHT}" y1="{level:.1f}" y2="{level:.1f}"/>'
+            f'<text class="threshold" x="{WIDTH - _RIGHT}" y="{level - 5:.1f}" text-anchor="end">'
+            f"{escape(threshold_label)}</text>"
+        )
     points = [(x(iteration), y(value), value, iteration) for iteration, value in zip(at[shown], drawn)]
     if len(points) > 1:
         parts.append(f'<polyline class="line" points="{" ".join(f"{px:.1f},{py:.1f}" for px, py, *_ in points)}"/>')
     if len(points) <= 80:
-        parts += [f'<circle class="dot" cx="{px:.1f}" cy="{py:.1f}" r="3.5"><title>iteration {iteration}: {number(value)}</title>'
-                  "</circle>" for px, py, value, iteration in points]
+        parts += [
+            f'<circle class="dot" cx="{px:.1f}" cy="{py:.1f}" r="3.5">'
+            f"<title>iteration {iteration}: {number(value)}</title>"
+            "</circle>"
+            for px, py, value, iteration in points
+        ]
     return "".join(parts) + "</svg>"
 
 
@@ -92,25 +108,36 @@ def histogram(values: np.ndarray, label: str, unit: str) -> str:
     low, high = np.log10(values.min()), np.log10(values.max())
     if high - low < 0.02:
         low, high = low - 0.05, high + 0.05
-    counts, edges = np.histogram(np.log10(values), bins=int(np.clip(np.sqrt(len(values)) * 2, 8, 48)), range=(low, high))
+    counts, edges = np.histogram(
+        np.log10(values), bins=int(np.clip(np.sqrt(len(values)) * 2, 8, 48)), range=(low, high)
+    )
     plot_width, plot_height = WIDTH - _LEFT - _RIGHT, HEIGHT - _TOP - _BOTTOM
     scale = plot_height / counts.max()
     bar = plot_width / len(counts)
     parts = [_open(label)]
     for tick in _round_ticks(0, float(counts.max())):
         level = HEIGHT - _BOTTOM - tick * scale
-        parts.append(f'<line class="grid" x1="{_LEFT}" x2="{WIDTH - _RIGHT}" y1="{level:.1f}" y2="{level:.1f}"/>'
-                     f'<text x="{_LEFT - 8}" y="{level + 4:.1f}" text-anchor="end">{tick:.0f}</text>')
+        parts.append(
+            f'<line class="grid" x1="{_LEFT}" x2="{WIDTH - _RIGHT}" y1="{level:.1f}" y2="{level:.1f}"/>'
+            f'<text x="{_LEFT - 8}" y="{level + 4:.1f}" text-anchor="end">{tick:.0f}</text>'
+        )
     for index, count in enumerate(counts):
         span = f"{number(10 ** edges[index])} to {number(10 ** edges[index + 1])}"
-        parts.append(f'<rect class="bar" x="{_LEFT + index * bar + 0.5:.1f}" y="{HEIGHT - _BOTTOM - count * scale:.1f}" '
-                     f'width="{max(bar - 1, 0.5):.1f}" height="{count * scale:.1f}"><title>{span} {escape(unit)}: {count}</title></rect>')
+        parts.append(
+            f'<rect class="bar" x="{_LEFT + index * bar + 0.5:.1f}" y="{HEIGHT - _BOTTOM - count * scale:.1f}" '
+            f'width="{max(bar - 1, 0.5):.1f}" height="{count * scale:.1f}">'
+            f"<title>{span} {escape(unit)}: {count}</title></rect>"
+        )
     for share in (0.0, 0.25, 0.5, 0.75, 1.0):
         where = _LEFT + share * plot_width
-        parts.append(f'<text x="{where:.1f}" y="{HEIGHT - _BOTTOM + 17}" text-anchor="middle">'
-                     f"{number(10 ** (low + share * (high - low)))}</text>")
-    parts.append(f'<text class="axis" x="{(WIDTH + _LEFT) / 2}" y="{HEIGHT - 6}" text-anchor="middle">{escape(unit)}, '
-                 "logarithmic</text>")
+        parts.append(
+            f'<text x="{where:.1f}" y="{HEIGHT - _BOTTOM + 17}" text-anchor="middle">'
+            f"{number(10 ** (low + share * (high - low)))}</text>"
+        )
+    parts.append(
+        f'<text class="axis" x="{(WIDTH + _LEFT) / 2}" y="{HEIGHT - 6}" text-anchor="middle">{escape(unit)}, '
+        "logarithmic</text>"
+    )
     return "".join(parts) + "</svg>"
 
 
@@ -120,8 +147,10 @@ def phase_bars(seconds: dict[str, float]) -> str:
     longest = max([*phases.values(), 1e-12])
     rows = []
     for name, value in phases.items():
-        rows.append(f'<div class="phase"><span>{escape(name)}</span><i><b style="width:{100 * value / longest:.2f}%"></b></i>'
-                    f"<em>{duration(value)}</em></div>")
+        rows.append(
+            f'<div class="phase"><span>{escape(name)}</span><i><b style="width:{100 * value / longest:.2f}%"></b></i>'
+            f"<em>{duration(value)}</em></div>"
+        )
     if "total" in seconds:
         rows.append(f'<div class="phase total"><span>total</span><i></i><em>{duration(seconds["total"])}</em></div>')
     return "".join(rows)

@@ -26,8 +26,21 @@ _HOVER_LIMIT = 20_000  # probes whose values travel in the page for reading them
 _OVERVIEW_LIMIT = 24  # levels shown side by side
 
 # Dark violet to yellow with even steps of lightness, sRGB.
-_SCALE = np.array([(68, 1, 84), (72, 40, 120), (62, 74, 137), (49, 104, 142), (38, 130, 142), (31, 158, 137), (53, 183, 121),
-                   (109, 205, 89), (180, 222, 44), (253, 231, 37)], float)
+_SCALE = np.array(
+    [
+        (68, 1, 84),
+        (72, 40, 120),
+        (62, 74, 137),
+        (49, 104, 142),
+        (38, 130, 142),
+        (31, 158, 137),
+        (53, 183, 121),
+        (109, 205, 89),
+        (180, 222, 44),
+        (253, 231, 37),
+    ],
+    float,
+)
 
 
 @dataclass
@@ -63,15 +76,25 @@ def slices_html(field: Field, block: str) -> str:
     for index, quantity in enumerate(quantities(field)):
         tab = f"{block}-{quantity.key}"
         checked = " checked" if index == 0 else ""
-        tabs.append(f'<input type="radio" name="{block}" id="{tab}" value="{quantity.key}"{checked}>'
-                    f'<label for="{tab}">{escape(quantity.title)}</label>')
+        tabs.append(
+            f'<input type="radio" name="{block}" id="{tab}" value="{quantity.key}"{checked}>'
+            f'<label for="{tab}">{escape(quantity.title)}</label>'
+        )
         panels.append(_panel(field, quantity, index == 0))
     level = nz // 2
     heights = _level_heights(field)
-    slider = (f'<label class="level">Level <input type="range" min="0" max="{nz - 1}" value="{level}" '
-              f'data-heights="{escape(",".join(heights), quote=True)}"><output></output></label>') if nz > 1 else ""
-    return (f'<div class="slices" data-nx="{nx}" data-ny="{ny}" data-nz="{nz}" style="--aspect:{_aspect(field)}">'
-            f'<div class="tabs">{"".join(tabs)}</div>{slider}{"".join(panels)}</div>')
+    slider = (
+        (
+            f'<label class="level">Level <input type="range" min="0" max="{nz - 1}" value="{level}" '
+            f'data-heights="{escape(",".join(heights), quote=True)}"><output></output></label>'
+        )
+        if nz > 1
+        else ""
+    )
+    return (
+        f'<div class="slices" data-nx="{nx}" data-ny="{ny}" data-nz="{nz}" style="--aspect:{_aspect(field)}">'
+        f'<div class="tabs">{"".join(tabs)}</div>{slider}{"".join(panels)}</div>'
+    )
 
 
 def _panel(field: Field, quantity: Quantity, shown: bool) -> str:
@@ -88,12 +111,17 @@ def _panel(field: Field, quantity: Quantity, shown: bool) -> str:
             hover = f' data-values="{packed}" data-unit="{escape(quantity.unit, quote=True)}"'
     atlas = base64.b64encode(png(_atlas(colours, field.grid.resolution))).decode()
     every = -(-nz // _OVERVIEW_LIMIT)
-    small = "".join(f'<figure><div class="slice" style="{_shift(level, nz)}"></div><figcaption>{level}</figcaption></figure>'
-                    for level in range(0, nz, every))
+    small = "".join(
+        f'<figure><div class="slice" style="{_shift(level, nz)}"></div><figcaption>{level}</figcaption></figure>'
+        for level in range(0, nz, every)
+    )
     overview = f'<div class="multiples">{small}</div>' if nz > 1 else ""
-    return (f'<div class="panel" data-key="{quantity.key}" style="--atlas:url(data:image/png;base64,{atlas});--levels:{nz}"'
-            f'{"" if shown else " hidden"}{hover}>'
-            f'<div class="slice large" style="{_shift(nz // 2, nz)}"></div><p class="readout">&nbsp;</p>{scale}{overview}</div>')
+    return (
+        f'<div class="panel" data-key="{quantity.key}" style="--atlas:url(data:image/png;base64,{atlas});--levels:{nz}"'
+        f"{'' if shown else ' hidden'}{hover}>"
+        f'<div class="slice large" style="{_shift(nz // 2, nz)}"></div>'
+        f'<p class="readout">&nbsp;</p>{scale}{overview}</div>'
+    )
 
 
 def _false_colours(quantity: Quantity, state: np.ndarray) -> tuple[np.ndarray, str]:
@@ -117,8 +145,10 @@ def _false_colours(quantity: Quantity, state: np.ndarray) -> tuple[np.ndarray, s
     stops = ",".join(f"rgb({r:.0f} {g:.0f} {b:.0f})" for r, g, b in _SCALE)
     labels = "".join(f"<span>{number(tick)}</span>" for tick in ticks)
     kind = "logarithmic" if logarithmic else "linear"
-    legend = (f'<div class="scale"><i style="background:linear-gradient(90deg,{stops})"></i><div>{labels}</div>'
-              f"<p>{escape(quantity.unit)}, {kind}; the brightest hundredth is clipped</p></div>")
+    legend = (
+        f'<div class="scale"><i style="background:linear-gradient(90deg,{stops})"></i><div>{labels}</div>'
+        f"<p>{escape(quantity.unit)}, {kind}; the brightest hundredth is clipped</p></div>"
+    )
     return _with_states(rgb, state), legend
 
 
@@ -190,4 +220,9 @@ def png(pixels: np.ndarray) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
     header = struct.pack(">IIBBBBB", width, height, 8, 6, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows.tobytes(), 9)) + chunk(b"IEND", b"")
+    return (
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", header)
+        + chunk(b"IDAT", zlib.compress(rows.tobytes(), 9))
+        + chunk(b"IEND", b"")
+    )

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The bake's work on the GPU, one method per kind of dispatch. The job in ``bake/`` decides what runs when.
 
-Texel surfaces of a batch of probes are layered images, one layer a probe, FACE wide and 6·FACE high. They stay on the GPU while
-the memory budget allows; the field never leaves it between iterations.
+Texel surfaces of a batch of probes are layered images, one layer a probe, FACE wide and 6·FACE high. They stay on the
+GPU while the memory budget allows; the field never leaves it between iterations.
 """
 
 from __future__ import annotations
@@ -28,9 +28,16 @@ from .textures import allocate, layers, read, upload
 
 _GROUP = 64  # threads that share a probe where its texels are summed
 _EMITTER_SAMPLES = 2048  # points on emitters that each probe looks at besides its texels
-# Kept images of texel surfaces. Albedo is 32 bit: in a bright room an error of 1e-4 in 0.99 is one of 1e-2 in the light.
-_SURFACE_FORMATS = {"geometry": "RGBA32F", "albedo": "RGBA32F", "emission": "RGBA32F", "source": "RGBA32F",
-                    "weights0": "RGBA16F", "weights1": "RGBA16F"}
+# Kept images of texel surfaces. Albedo is 32 bit: in a bright room an error of 1e-4 in 0.99 is one of 1e-2 in the
+# light.
+_SURFACE_FORMATS = {
+    "geometry": "RGBA32F",
+    "albedo": "RGBA32F",
+    "emission": "RGBA32F",
+    "source": "RGBA32F",
+    "weights0": "RGBA16F",
+    "weights1": "RGBA16F",
+}
 BYTES_PER_TEXEL = sum(16 if pixel == "RGBA32F" else 8 for pixel in _SURFACE_FORMATS.values())
 _HIT_BYTES = 20  # hit record and depth, which exist during capture only
 
@@ -79,7 +86,8 @@ class GpuBackend:
         self._hits = None
         self._raster = None
 
-    # Probes -----------------------------------------------------------------------------------------------------------------
+    # Probes
+    # -----------------------------------------------------------------------------------------------------------------
 
     def set_probes(self, nodes: np.ndarray, positions: np.ndarray) -> None:
         """Active probes: ``nodes`` (S,) grid indices and ``positions`` (S, 3) world metres, by slot."""
@@ -117,7 +125,8 @@ class GpuBackend:
         info = lookup.grid_info(self.grid)
         self._grid_info = gpu.types.GPUUniformBuf(gpu.types.Buffer("FLOAT", info.size, info.reshape(-1)))
 
-    # Capture ----------------------------------------------------------------------------------------------------------------
+    # Capture
+    # ----------------------------------------------------------------------------------------------------------------
 
     def surfaces(self, first: int, count: int) -> Surfaces:
         """Empty texel surfaces for slots ``first`` .. ``first + count``."""
@@ -125,7 +134,8 @@ class GpuBackend:
         return Surfaces(first, count, textures)
 
     def capture(self, surfaces: Surfaces, method: str, start: int = 0, count: int | None = None) -> None:
-        """Fills geometry, albedo and emission of all or of ``count`` probes from ``start``. ``method``: "raster" or "trace"."""
+        """Fills geometry, albedo and emission of all or of ``count`` probes from ``start``. ``method``: "raster" or
+        "trace"."""
         stop = surfaces.count if count is None else start + count
         for first_layer in range(start, stop, self._probes_per_capture):
             part = min(self._probes_per_capture, stop - first_layer)
@@ -134,7 +144,9 @@ class GpuBackend:
             if method == "raster":
                 if self._raster is None:
                     self._raster = RasterCapture(self.scene, self.face, hits.layers // 6)
-                self._raster(self._positions[first_slot:first_slot + part], first_slot, self._probe_slots, hits.texture)
+                self._raster(
+                    self._positions[first_slot : first_slot + part], first_slot, self._probe_slots, hits.texture
+                )
             else:
                 self._trace(first_slot, part, hits)
             self._resolve(first_slot, first_layer, part, hits, surfaces)
@@ -194,7 +206,8 @@ class GpuBackend:
         return read(result, len(layers_) * 6).reshape(-1, 6, 4)
 
     def statistics(self, surfaces: Surfaces) -> None:
-        """Depth moments and what the probes see as a whole. Needs captured surfaces with source and without lookup weights."""
+        """Depth moments and what the probes see as a whole. Needs captured surfaces with source and without lookup
+        weights."""
         shader = program("probe_statistics_comp", FACE=self.face)
         shader.uniform_sampler("texel_weights", self._texel_weights)
         shader.uniform_sampler("shells", self._shells)
@@ -216,7 +229,8 @@ class GpuBackend:
         moments = read(self._moments, len(self._nodes) * DEPTH_EDGE**2, channels=2)
         return moments.reshape(len(self._nodes), DEPTH_EDGE**2, 2)
 
-    # Light ------------------------------------------------------------------------------------------------------------------
+    # Light
+    # ------------------------------------------------------------------------------------------------------------------
 
     def weigh_lookups(self, surfaces: Surfaces) -> None:
         """Where every texel surface reads the field: weights and first node."""
@@ -248,8 +262,13 @@ class GpuBackend:
 
     def iterate(self, surfaces: Surfaces, read_field: bool) -> None:
         """One light iteration of these probes: reads the newest field and writes over the oldest."""
-        shader = program("light_iterate_comp", FACE=self.face, BANDS=self.settings.bands,
-                         COEFFICIENTS=self.coefficients, GROUP=_GROUP)
+        shader = program(
+            "light_iterate_comp",
+            FACE=self.face,
+            BANDS=self.settings.bands,
+            COEFFICIENTS=self.coefficients,
+            GROUP=_GROUP,
+        )
         shader.uniform_block("grid_info", self._grid_info)
         shader.uniform_sampler("probe_slots", self._probe_slots)
         shader.uniform_sampler("texel_weights", self._texel_weights)
@@ -263,8 +282,14 @@ class GpuBackend:
 
     def add_emission(self, surfaces: Surfaces) -> None:
         """Adds what these probes see of sampled emitters to the newest field."""
-        shader = program("emission_project_comp", FACE=self.face, BANDS=self.settings.bands, COEFFICIENTS=self.coefficients,
-                         GROUP=_GROUP, **self.scene.light_defines)
+        shader = program(
+            "emission_project_comp",
+            FACE=self.face,
+            BANDS=self.settings.bands,
+            COEFFICIENTS=self.coefficients,
+            GROUP=_GROUP,
+            **self.scene.light_defines,
+        )
         self.scene.bind_surfaces(shader)
         self.scene.bind_emitters(shader)
         shader.uniform_sampler("probe_slots", self._probe_slots)
@@ -279,20 +304,33 @@ class GpuBackend:
 
     def gather(self, surfaces: Surfaces) -> None:
         """Adds to source what really traced bounces bring; afterwards iterate without reading the field."""
-        shader = program("gather_comp", FACE=self.face, BANDS=self.settings.bands, COEFFICIENTS=self.coefficients,
-                         **(self.scene.surface_defines | self.scene.light_defines | {"HAS_IMAGES": self.scene.has_images}))
+        shader = program(
+            "gather_comp",
+            FACE=self.face,
+            BANDS=self.settings.bands,
+            COEFFICIENTS=self.coefficients,
+            **(self.scene.surface_defines | self.scene.light_defines | {"HAS_IMAGES": self.scene.has_images}),
+        )
         self.scene.bind_surfaces(shader)
         self.scene.bind_lights(shader)
         shader.uniform_block("grid_info", self._grid_info)
-        for name, texture in (("grid_nodes", self._grid_nodes), ("depth_moments", self._moments), ("field_in", self._field[0]),
-                              ("world_texels", self._world_texels), ("probe_slots", self._probe_slots)):
+        for name, texture in (
+            ("grid_nodes", self._grid_nodes),
+            ("depth_moments", self._moments),
+            ("field_in", self._field[0]),
+            ("world_texels", self._world_texels),
+            ("probe_slots", self._probe_slots),
+        ):
             shader.uniform_sampler(name, texture)
         for name in ("geometry", "albedo"):
             shader.uniform_sampler(name, surfaces.textures[name])
         shader.image("source", surfaces.textures["source"])
         self._set_range(shader, surfaces)
-        for name, value in (("samples", self.settings.samples),
-                            ("bounces", self.settings.gather), ("seed", self.settings.seed)):
+        for name, value in (
+            ("samples", self.settings.samples),
+            ("bounces", self.settings.gather),
+            ("seed", self.settings.seed),
+        ):
             shader.uniform_int(name, (value,))
         self._dispatch_texels(shader, surfaces.count)
 
@@ -332,7 +370,8 @@ class GpuBackend:
         values = read(self._field[0], self.grid.count * self.coefficients)
         return np.ascontiguousarray(values[:, :3].reshape(self.grid.count, self.coefficients, 3))
 
-    # Dispatch ---------------------------------------------------------------------------------------------------------------
+    # Dispatch
+    # ---------------------------------------------------------------------------------------------------------------
 
     def _set_range(self, shader, surfaces: Surfaces) -> None:
         shader.uniform_int("first_slot", (surfaces.first,))

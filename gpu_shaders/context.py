@@ -14,8 +14,8 @@ _made = False
 def ensure_context() -> None:
     """Makes GPU calls possible; does nothing where they are already.
 
-    With a window there always is a context. Without one, Blender 5.2 has ``gpu.init``; before that a render by an engine
-    that asks for a context leaves one behind. A machine without a working driver aborts the process here, which
+    With a window there always is a context. Without one, Blender 5.2 has ``gpu.init``; before that a render by an
+    engine that asks for a context leaves one behind. A machine without a working driver aborts the process here, which
     the command line's parent process turns into a plain message.
 
     Raises:

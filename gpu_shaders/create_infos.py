@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bindings of every shader: one function per shader, of the shader's name.
 
-Each takes a fresh ``GPUShaderCreateInfo`` and the defines of the variant, declares resources, and returns which files make up which
-stage, libraries first.
+Each takes a fresh ``GPUShaderCreateInfo`` and the defines of the variant, declares resources, and returns which files
+make up which stage, libraries first.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ def _ints(info, *names: str) -> None:
 
 
 def _scene(info, defines: dict, first: int = 0, attributes: bool = True) -> int:
-    """The scene's samplers: hierarchy and triangles; what surfaces are made of where ``attributes`` or holes need it."""
+    """The scene's samplers: hierarchy and triangles; what surfaces are made of where ``attributes`` or holes need
+    it."""
     names = ["bvh_nodes", "triangle_corners"]
     if attributes or "HAS_ALPHA" in defines:
         names += ["triangle_attributes", "materials"]
@@ -75,8 +76,10 @@ def capture_raster(info, defines):
     info.vertex_in(0, "FLOAT", "vertex_number")
     info.depth_write("ANY")
     info.fragment_out(0, "VEC4", "hit")
-    return {"vertex": ["data_lib", "cubemap_lib", "capture_raster_vert"],
-            "fragment": ["data_lib", *_surface_files(defines), "capture_raster_frag"]}
+    return {
+        "vertex": ["data_lib", "cubemap_lib", "capture_raster_vert"],
+        "fragment": ["data_lib", *_surface_files(defines), "capture_raster_frag"],
+    }
 
 
 def surface_resolve_comp(info, defines):
@@ -170,7 +173,15 @@ def emission_project_comp(info, defines):
     _image(info, 0, "field", access="READ+WRITE")
     _ints(info, "first_slot", "first_layer", "light_count", "samples", "seed")
     info.local_group_size(int(defines["GROUP"]), 1, 1)
-    return {"compute": ["data_lib", "cubemap_lib", "spherical_harmonics_lib", *_light_files(defines), "emission_project_comp"]}
+    return {
+        "compute": [
+            "data_lib",
+            "cubemap_lib",
+            "spherical_harmonics_lib",
+            *_light_files(defines),
+            "emission_project_comp",
+        ]
+    }
 
 
 def light_iterate_comp(info, defines):
@@ -217,8 +228,20 @@ def preview_comp(info, defines):
     info.uniform_buf(1, "vec4", "view_info[5]")
     _ints(info, "light_count", "sample_index", "show_direct")
     info.local_group_size(8, 8, 1)
-    return {"compute": ["data_lib", "cubemap_lib", "random_lib", "spherical_harmonics_lib", "surface_lib", "ray_lib",
-                        "direct_light_lib", "lookup_lib", "field_lib", "preview_comp"]}
+    return {
+        "compute": [
+            "data_lib",
+            "cubemap_lib",
+            "random_lib",
+            "spherical_harmonics_lib",
+            "surface_lib",
+            "ray_lib",
+            "direct_light_lib",
+            "lookup_lib",
+            "field_lib",
+            "preview_comp",
+        ]
+    }
 
 
 def gather_comp(info, defines):
@@ -231,5 +254,14 @@ def gather_comp(info, defines):
     _image(info, 0, "source", layered=True, access="READ+WRITE")
     _ints(info, "first_slot", "first_layer", "light_count", "samples", "bounces", "seed")
     info.local_group_size(8, 8, 1)
-    return {"compute": ["data_lib", "cubemap_lib", "spherical_harmonics_lib", *_light_files(defines | {"HAS_ALPHA": True}),
-                        "lookup_lib", "field_lib", "gather_comp"]}
+    return {
+        "compute": [
+            "data_lib",
+            "cubemap_lib",
+            "spherical_harmonics_lib",
+            *_light_files(defines | {"HAS_ALPHA": True}),
+            "lookup_lib",
+            "field_lib",
+            "gather_comp",
+        ]
+    }

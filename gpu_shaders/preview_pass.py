@@ -46,15 +46,21 @@ class PreviewPass:
         background[:, :3] = world_texels(snapshot.world, _BACKGROUND_FACE).reshape(-1, 3)
         self._background = upload(background, "texels")
 
-    def render(self, camera: Camera, width: int, height: int, samples: int, *, direct: bool = True,
-               should_stop=lambda: False) -> tuple[np.ndarray, np.ndarray] | None:
+    def render(
+        self, camera: Camera, width: int, height: int, samples: int, *, direct: bool = True, should_stop=lambda: False
+    ) -> tuple[np.ndarray, np.ndarray] | None:
         """The scene, and the scene with its probes as spheres lit by their own irradiance.
 
-        Each (height, width, 3) float32 linear radiance, row 0 at the bottom; None when ``should_stop`` said so. ``direct`` False
-        shows the field's light alone.
+        Each (height, width, 3) float32 linear radiance, row 0 at the bottom; None when ``should_stop`` said so.
+        ``direct`` False shows the field's light alone.
         """
-        shader = program("preview_comp", FACE=_BACKGROUND_FACE, BANDS=self._field.bands,
-                         COEFFICIENTS=self._field.bands**2, **self._scene.surface_defines)
+        shader = program(
+            "preview_comp",
+            FACE=_BACKGROUND_FACE,
+            BANDS=self._field.bands,
+            COEFFICIENTS=self._field.bands**2,
+            **self._scene.surface_defines,
+        )
         pictures = [gpu.types.GPUTexture((width, height), format="RGBA32F") for _ in range(2)]
         view, centres = self._view(camera)
         view_info = gpu.types.GPUUniformBuf(gpu.types.Buffer("FLOAT", view.size, view.reshape(-1)))
@@ -64,8 +70,13 @@ class PreviewPass:
                 return None
             self._scene.bind_surfaces(shader)
             self._scene.bind(shader, "lights")
-            for name, texture in (("grid_nodes", self._nodes), ("depth_moments", self._moments), ("spheres", sphere_texture),
-                                  ("field_in", self._coefficients), ("world_texels", self._background)):
+            for name, texture in (
+                ("grid_nodes", self._nodes),
+                ("depth_moments", self._moments),
+                ("spheres", sphere_texture),
+                ("field_in", self._coefficients),
+                ("world_texels", self._background),
+            ):
                 shader.uniform_sampler(name, texture)
             shader.uniform_block("grid_info", self._grid_info)
             shader.uniform_block("view_info", view_info)
@@ -85,7 +96,9 @@ class PreviewPass:
         eye = camera.position - grid.center
         view[0] = (*eye, camera.orthographic)
         view[1, :3], view[2, :3], view[3, :3] = camera.right, camera.up, camera.forward
-        marks = np.where(self._field.state == ACTIVE, np.arange(grid.count), np.where(self._field.state == CULLED, -1, -2))
+        marks = np.where(
+            self._field.state == ACTIVE, np.arange(grid.count), np.where(self._field.state == CULLED, -1, -2)
+        )
         centres = np.concatenate([self._positions, marks[:, None]], axis=1)
         radius = 0.08 * float(grid.cell_size().min())
         distance = np.linalg.norm(self._positions - eye, axis=1)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 import gpu
@@ -13,7 +13,8 @@ from . import create_infos
 
 _GLSL = Path(__file__).parent / "glsl"
 
-# Never emptied: in Blender 4.5 and 5.0 the address of a freed shader can be reused, and the old program then runs silently.
+# Never emptied: in Blender 4.5 and 5.0 the address of a freed shader can be reused, and the old program then runs
+# silently.
 _programs: dict[tuple, gpu.types.GPUShader] = {}
 
 
@@ -48,6 +49,6 @@ def _compile(name: str, defines: dict) -> gpu.types.GPUShader:
         raise NoGpuError(f"the graphics driver does not compile shader '{name}': {error}; update the driver") from error
 
 
-@lru_cache(maxsize=None)
+@cache
 def _source(file: str) -> str:
     return (_GLSL / f"{file}.glsl").read_text(encoding="utf-8")

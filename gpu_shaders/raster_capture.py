@@ -15,15 +15,16 @@ from .textures import layers, upload
 CLUSTER_SIZE = 64  # triangles drawn together, neighbours in leaf order
 _PAIRS_AT_ONCE = 1 << 22
 # Inner normals of the four planes of each face's pyramid.
-_PLANES = np.stack([FACE_FORWARD + FACE_RIGHT, FACE_FORWARD - FACE_RIGHT,
-                    FACE_FORWARD + FACE_UP, FACE_FORWARD - FACE_UP], axis=1)  # (6, 4, 3)
+_PLANES = np.stack(
+    [FACE_FORWARD + FACE_RIGHT, FACE_FORWARD - FACE_RIGHT, FACE_FORWARD + FACE_UP, FACE_FORWARD - FACE_UP], axis=1
+)  # (6, 4, 3)
 
 
 def visible_pairs(low: np.ndarray, high: np.ndarray, probes: np.ndarray) -> np.ndarray:
     """(N, 2) int (cluster, layer) for every cluster box that may be seen in a face; layer = probe·6 + face.
 
-    ``low``, ``high`` (C, 3) boxes, ``probes`` (P, 3) positions in the same frame. Conservative: a box is left out only when it
-    lies wholly outside one plane of the face's pyramid. Sorted by layer.
+    ``low``, ``high`` (C, 3) boxes, ``probes`` (P, 3) positions in the same frame. Conservative: a box is left out only
+    when it lies wholly outside one plane of the face's pyramid. Sorted by layer.
     """
     centre, half = (low + high) / 2, (high - low) / 2
     offset = centre[None] - probes[:, None]  # (P, C, 3)
@@ -70,7 +71,7 @@ class RasterCapture:
             shader = self._shader
             shader.bind()
             for start in range(0, len(probes), probes_at_once):
-                pairs = visible_pairs(self._low, self._high, probes[start:start + probes_at_once])
+                pairs = visible_pairs(self._low, self._high, probes[start : start + probes_at_once])
                 if not len(pairs):
                     continue
                 pairs[:, 1] += start * 6

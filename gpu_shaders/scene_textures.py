@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A scene snapshot as textures: hierarchy, triangles, materials, images and lights.
 
-All positions are relative to an origin (the volume's centre), so a scene far from the world's origin loses nothing to float32.
+All positions are relative to an origin (the volume's centre), so a scene far from the world's origin loses nothing to
+float32.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ _POINT, _SPOT, _SUN, _RECTANGLE, _ELLIPSE = range(5)
 class SceneTextures:
     """Everything that shaders read about the scene.
 
-    ``defines`` are what every shader that touches surfaces must be compiled with; ``bind`` hands it the textures it declares.
+    ``defines`` are what every shader that touches surfaces must be compiled with; ``bind`` hands it the textures it
+    declares.
     """
 
     def __init__(self, snapshot: SceneSnapshot, origin: np.ndarray, emitter_density: np.ndarray):
@@ -35,7 +37,8 @@ class SceneTextures:
         self.light_count = len(snapshot.lights)
         density = emitter_density[order]
         self.emitter_count = int((density > 0).sum())
-        # Nearer than this a direction about the normal finds an emitter at least as often as a point on the emitters falls there.
+        # Nearer than this a direction about the normal finds an emitter at least as often as a point on the emitters
+        # falls there.
         self.emitter_reach = (np.pi * density[density > 0].min()) ** -0.5 if self.emitter_count else 0.0
 
         material = np.clip(snapshot.material_index[order], 0, max(len(snapshot.materials) - 1, 0))
@@ -47,7 +50,8 @@ class SceneTextures:
             "bvh_nodes": upload(self.hierarchy.nodes, "hierarchy nodes"),
             "triangle_corners": upload(rows, "triangle corners"),
             "triangle_attributes": upload(
-                _attributes(snapshot, order, material, self.corners, density), "triangle attributes"),
+                _attributes(snapshot, order, material, self.corners, density), "triangle attributes"
+            ),
             "materials": upload(_materials(snapshot), "materials"),
             "emitters": upload(_emitters(density, self.corners), "emitters"),
             "lights": upload(pack_lights(snapshot.lights, origin), "lights"),
@@ -107,8 +111,9 @@ class SceneTextures:
             self.bind(shader, "image_table", "image_texels")
 
 
-def _attributes(snapshot: SceneSnapshot, order: np.ndarray, material: np.ndarray, corners: np.ndarray,
-                density: np.ndarray) -> np.ndarray:
+def _attributes(
+    snapshot: SceneSnapshot, order: np.ndarray, material: np.ndarray, corners: np.ndarray, density: np.ndarray
+) -> np.ndarray:
     """(T, 5, 4) rows of surface_lib's triangle_attributes, in leaf order."""
     uvs = snapshot.corner_uvs[order].astype(np.float32)
     rows = np.zeros((len(order), 5, 4), np.float32)
@@ -178,7 +183,10 @@ def pack_lights(lights: list[Light], origin: np.ndarray) -> np.ndarray:
             row[1, 3] = light.radius
             row[5, 2] = light.soft_falloff
             if light.kind == "SPOT":
-                row[2, 3], row[3, 3] = light.spot_scale[2] / light.spot_scale[0], light.spot_scale[2] / light.spot_scale[1]
+                row[2, 3], row[3, 3] = (
+                    light.spot_scale[2] / light.spot_scale[0],
+                    light.spot_scale[2] / light.spot_scale[1],
+                )
                 cosine = np.cos(light.spot_size / 2)
                 row[5, :2] = cosine, 1 / max((1 - cosine) * light.spot_blend, 1e-6)
     return rows

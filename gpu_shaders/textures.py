@@ -49,5 +49,7 @@ def _rows(elements: int, what: str) -> int:
     limit = gpu.capabilities.max_texture_size_get()
     rows = max(1, -(-elements // ROW))
     if rows > limit:
-        raise InputError(f"{elements} {what} do not fit the GPU, which holds {limit * ROW}; bake a smaller part of the scene")
+        raise InputError(
+            f"{elements} {what} do not fit the GPU, which holds {limit * ROW}; bake a smaller part of the scene"
+        )
     return rows

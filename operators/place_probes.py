@@ -43,7 +43,9 @@ class GRIDLIGHT_OT_place_probes(bpy.types.Operator):
             probe_objects.clear_probes(scene, gone)
         state = np.concatenate(states)
         active = int((state == ACTIVE).sum())
-        self.report({"INFO"}, f"{active} of {len(state)} probes placed; {len(state) - active} light nothing and are culled")
+        self.report(
+            {"INFO"}, f"{active} of {len(state)} probes placed; {len(state) - active} light nothing and are culled"
+        )
         return {"FINISHED"}
 
 

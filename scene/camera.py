@@ -22,5 +22,6 @@ def read_camera(scene: bpy.types.Scene, aspect: float = 16 / 9) -> Camera | None
     matrix = np.array(object_.matrix_world.normalized(), float)
     orthographic = object_.data.type == "ORTHO"
     half_width = object_.data.ortho_scale / 2 if orthographic else math.tan(object_.data.angle_x / 2)
-    return Camera(matrix[:3, 3], matrix[:3, 0] * half_width, matrix[:3, 1] * half_width / aspect, -matrix[:3, 2],
-                  orthographic)
+    return Camera(
+        matrix[:3, 3], matrix[:3, 0] * half_width, matrix[:3, 1] * half_width / aspect, -matrix[:3, 2], orthographic
+    )

@@ -73,8 +73,8 @@ def panoramic_camera(camera: bpy.types.Object) -> None:
 
 
 def unbiased_settings(scene: bpy.types.Scene, samples: int, bounces: int) -> None:
-    """Make ``scene`` render with Cycles, ``samples`` per pixel, without any shortcut that changes the expected value.
-    """
+    """Make ``scene`` render with Cycles, ``samples`` per pixel, without any shortcut that changes the expected
+    value."""
     scene.render.engine = "CYCLES"
     scene.render.use_persistent_data = True
     cycles = scene.cycles

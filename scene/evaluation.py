@@ -37,9 +37,15 @@ def at_render_quality(
         except Exception as error:  # Blender would print and drop it here; it is raised again below
             outcome.append((None, error))
 
-    engine = type("GridlightSceneReader", (bpy.types.RenderEngine,), {
-        "bl_idname": "GRIDLIGHT_SCENE_READER", "bl_label": "Gridlight Scene Reader", "render": render,
-    })
+    engine = type(
+        "GridlightSceneReader",
+        (bpy.types.RenderEngine,),
+        {
+            "bl_idname": "GRIDLIGHT_SCENE_READER",
+            "bl_label": "Gridlight Scene Reader",
+            "render": render,
+        },
+    )
     _leave_edit_data_current(scene)
     bpy.utils.register_class(engine)
     try:

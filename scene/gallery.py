@@ -22,8 +22,17 @@ from .volumes import create_volume
 FIRST_FRAME, LAST_FRAME = 1, 250
 
 # Frame: position of the wandering lamp; it returns to where it started.
-LAMP_PATH = {1: (-7.6, 1.3, 2.1), 32: (-4.85, 0.3, 2.0), 63: (-0.4, 2.1, 2.3), 94: (4.85, -0.3, 2.0), 125: (7.8, -1.4, 2.1),
-             157: (4.85, 0.3, 2.0), 188: (0.0, -1.8, 2.3), 219: (-4.85, -0.3, 2.0), 250: (-7.6, 1.3, 2.1)}
+LAMP_PATH = {
+    1: (-7.6, 1.3, 2.1),
+    32: (-4.85, 0.3, 2.0),
+    63: (-0.4, 2.1, 2.3),
+    94: (4.85, -0.3, 2.0),
+    125: (7.8, -1.4, 2.1),
+    157: (4.85, 0.3, 2.0),
+    188: (0.0, -1.8, 2.3),
+    219: (-4.85, -0.3, 2.0),
+    250: (-7.6, 1.3, 2.1),
+}
 
 EAST, WEST, NORTH, SOUTH = -np.pi / 2, np.pi / 2, 0.0, np.pi  # turn of what hangs on that wall of a room
 
@@ -112,9 +121,15 @@ class _Builder:
         self.put("Bench", furnishing.bench, (8.1, -1.35, 0))
 
     def lamps(self) -> None:
-        """Wall lamps, light panels and coves: they glow, so their light is in the probes without being a light object."""
+        """Wall lamps, light panels and coves: they glow, so their light is in the probes without being a light
+        object."""
         hall, wing, upper = plan.HALL_Y, plan.WING_Y, plan.LOGGIA_FLOOR
-        places = [((-1.4, hall, 2.2), NORTH), ((1.4, hall, 2.2), NORTH), ((0.75, -hall, 2.2), SOUTH), ((3.85, -hall, 2.2), SOUTH)]
+        places = [
+            ((-1.4, hall, 2.2), NORTH),
+            ((1.4, hall, 2.2), NORTH),
+            ((0.75, -hall, 2.2), SOUTH),
+            ((3.85, -hall, 2.2), SOUTH),
+        ]
         for side in (-1, 1):
             for level in (0, upper):
                 places += [((side * 5.75, wing, level + 2.1), NORTH), ((side * 5.75, -wing, level + 2.1), SOUTH)]
@@ -124,7 +139,13 @@ class _Builder:
         panels = [(6.55, 1, 0), (8.05, 1, 0), (6.75, -1, 0), (9.5, -1, 0)]
         panels += [(side * x, wall, upper) for side in (-1, 1) for x in (6.6, 9.6) for wall in (-1, 1)]
         for x, wall, floor in panels:
-            self.put("Light panel", furnishing.light_panel, (x, wall * wing, floor + 1.75), NORTH if wall > 0 else SOUTH, group="wall")
+            self.put(
+                "Light panel",
+                furnishing.light_panel,
+                (x, wall * wing, floor + 1.75),
+                NORTH if wall > 0 else SOUTH,
+                group="wall",
+            )
         self.put("Cove lights", plan.cove_lights, group="wall")
 
     def lights(self) -> None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What stands and hangs in the demo gallery: pictures, sculptures, plinths, benches and wall lamps.
 
-Each function returns a ``Solid`` around its own origin: things that stand have it at their foot, things that hang at the wall
-behind their middle, facing −y.
+Each function returns a ``Solid`` around its own origin: things that stand have it at their foot, things that hang at
+the wall behind their middle, facing −y.
 """
 
 from __future__ import annotations
@@ -18,8 +18,10 @@ def frame(width: float, height: float, material: str = "Gilding", size: float = 
     # outwards, off the wall
     profile = size * np.array([(0.0, 0.0), (0.09, 0.0), (0.09, 0.035), (0.06, 0.06), (0.03, 0.05), (0.0, 0.03)])
     w, h = width / 2, height / 2
-    sections = [np.stack([sx * (w + profile[:, 0]), -profile[:, 1], sz * (h + profile[:, 0])], axis=1)
-                for sx, sz in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    sections = [
+        np.stack([sx * (w + profile[:, 0]), -profile[:, 1], sz * (h + profile[:, 0])], axis=1)
+        for sx, sz in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    ]
     return lofted(np.array(sections), material, closed=True)
 
 
@@ -39,8 +41,11 @@ def wall_lamp() -> Solid:
     """A half-round alabaster bowl between two gilded bands, 0.3 m deep."""
     angle = np.linspace(np.pi, 2 * np.pi, 13)
     parts = None
-    for low, high, radius, material in ((-0.34, -0.28, 0.24, "Gilding"), (-0.28, 0.28, 0.22, "Alabaster glow"),
-                                        (0.28, 0.34, 0.24, "Gilding")):
+    for low, high, radius, material in (
+        (-0.34, -0.28, 0.24, "Gilding"),
+        (-0.28, 0.28, 0.22, "Alabaster glow"),
+        (0.28, 0.34, 0.24, "Gilding"),
+    ):
         bow = np.stack([radius * np.cos(angle), 1.25 * radius * np.sin(angle)], axis=1)
         sections = np.stack([np.concatenate([bow, np.full((len(bow), 1), z)], axis=1) for z in (low, high)])
         part = lofted(sections, material)
@@ -92,7 +97,9 @@ def twisted_column() -> Solid:
 
 def amphora(material: str = "Terracotta") -> Solid:
     """A tall vase."""
-    profile = spline([(0.10, 0.0), (0.12, 0.03), (0.27, 0.38), (0.20, 0.62), (0.075, 0.74), (0.085, 0.84), (0.13, 0.9)], 20)
+    profile = spline(
+        [(0.10, 0.0), (0.12, 0.03), (0.27, 0.38), (0.20, 0.62), (0.075, 0.74), (0.085, 0.84), (0.13, 0.9)], 20
+    )
     return turned(profile, material, sides=20)
 
 

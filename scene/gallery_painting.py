@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The pictures and floors of the demo gallery, painted by arithmetic.
 
-Every painting is a pure function of its size: (height, width, 3) float, sRGB-encoded 0..1, row 0 at the bottom, the same
-bytes on every run. ``packed_image`` turns one into a Blender image that travels inside the .blend.
+Every painting is a pure function of its size: (height, width, 3) float, sRGB-encoded 0..1, row 0 at the bottom, the
+same bytes on every run. ``packed_image`` turns one into a Blender image that travels inside the .blend.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-
 WHITEST = 0.92  # sRGB-encoded: 0.83 linear, about what white paint reflects
 
 
 def packed_image(name: str, pixels: np.ndarray) -> bpy.types.Image:
-    """A packed byte image of sRGB ``pixels`` (height, width, 3), row 0 at the bottom; nothing in it is above WHITEST."""
+    """A packed byte image of sRGB ``pixels`` (height, width, 3), row 0 at the bottom; nothing in it is above
+    WHITEST."""
     height, width = pixels.shape[:2]
     image = bpy.data.images.new(name, width, height, alpha=False)
     rgba = np.ones((height, width, 4), np.float32)
@@ -100,8 +100,19 @@ def ridges_at_dusk(height: int = 448, width: int = 768) -> np.ndarray:
 def rings(height: int = 512, width: int = 512) -> np.ndarray:
     """Interlocking discs cut into coloured quadrants."""
     rng = np.random.default_rng(1912)
-    palette = np.array([(0.86, 0.16, 0.12), (0.97, 0.70, 0.12), (0.07, 0.28, 0.55), (0.95, 0.90, 0.78), (0.06, 0.45, 0.40),
-                        (0.93, 0.45, 0.10), (0.10, 0.10, 0.14), (0.55, 0.70, 0.78), (0.62, 0.10, 0.25)])
+    palette = np.array(
+        [
+            (0.86, 0.16, 0.12),
+            (0.97, 0.70, 0.12),
+            (0.07, 0.28, 0.55),
+            (0.95, 0.90, 0.78),
+            (0.06, 0.45, 0.40),
+            (0.93, 0.45, 0.10),
+            (0.10, 0.10, 0.14),
+            (0.55, 0.70, 0.78),
+            (0.62, 0.10, 0.25),
+        ]
+    )
     y, x = np.mgrid[:height, :width] / max(height, width)
     warp = 0.006 * (fractal_noise((height, width), (6, 6), 3, rng) - 0.5)
     picture = np.full((height, width, 3), (0.92, 0.86, 0.72))
@@ -124,8 +135,17 @@ def tide(height: int = 640, width: int = 448) -> np.ndarray:
     fold_x, fold_y = (fractal_noise(shape, (4, 3), 4, rng) - 0.5 for _ in range(2))
     y, x = np.mgrid[:height, :width] / height
     flow = y * 2.1 + 0.5 * np.sin(5.0 * (x + 1.3 * fold_x)) + 2.1 * fold_y
-    stops = np.array([(0.03, 0.10, 0.20), (0.02, 0.30, 0.42), (0.10, 0.55, 0.58), (0.90, 0.86, 0.74), (0.93, 0.62, 0.22),
-                      (0.70, 0.20, 0.14), (0.20, 0.06, 0.12)])
+    stops = np.array(
+        [
+            (0.03, 0.10, 0.20),
+            (0.02, 0.30, 0.42),
+            (0.10, 0.55, 0.58),
+            (0.90, 0.86, 0.74),
+            (0.93, 0.62, 0.22),
+            (0.70, 0.20, 0.14),
+            (0.20, 0.06, 0.12),
+        ]
+    )
     where = np.mod(flow, 1.0) * len(stops)
     low = where.astype(int) % len(stops)
     share = _smooth(0.35, 0.65, where - where.astype(int))

@@ -12,8 +12,8 @@ A vaulted hall between two wings, each with a room below and a loggia above that
        | crimson      hall        teal  |               +--------+           +--------+
        +--------------------------------+ z = 0                  +-----------+
 
-The probe volume spans all of it: 11 × 4 × 7 nodes over 22 m × 5.4 m × 7.2 m, cells of 2.2 m × 1.8 m × 1.2 m. The hall is
-wider than the wings by more than half a cell on both sides, so between the sculptures below z = 2.7 and the cornice
+The probe volume spans all of it: 11 × 4 × 7 nodes over 22 m × 5.4 m × 7.2 m, cells of 2.2 m × 1.8 m × 1.2 m. The hall
+is wider than the wings by more than half a cell on both sides, so between the sculptures below z = 2.7 and the cornice
 above z = 5.1 its air is free of surface: the three columns of nodes there at z = 3.9 light nothing, and neither does
 one more at z = 2.7 that stands where the south wall has no lamp. Culling finds these 13 of the 308 by itself.
 """
@@ -53,14 +53,38 @@ def shell() -> Solid:
     rooms = [((-HALL_X, -HALL_Y, 0), (HALL_X, HALL_Y, HALL_TOP), "Plaster", "Stone tiles", "Ceiling")]
     for side, low_wall, high_wall in ((-1, "Crimson wall", "Ochre wall"), (1, "Teal wall", "Green wall")):
         outer.append((*_ordered((side * 5.0, -3.15, -0.3), (side * 11.5, 3.15, 8.0)),))
-        rooms.append((*_ordered((side * WING_X0, -WING_Y, 0), (side * WING_X1, WING_Y, ROOM_TOP)),
-                      low_wall, "Oak parquet", "Ceiling"))
-        rooms.append((*_ordered((side * WING_X0, -WING_Y, LOGGIA_FLOOR), (side * WING_X1, WING_Y, LOGGIA_TOP)),
-                      high_wall, "Oak parquet", "Ceiling"))
-        rooms.append((*_ordered((side * HALL_X, -DOOR_HALF, 0), (side * WING_X0, DOOR_HALF, DOOR_TOP)),
-                      "Limestone", "Limestone", "Limestone"))
-        rooms.append((*_ordered((side * HALL_X, -ARCH_HALF, LOGGIA_FLOOR), (side * WING_X0, ARCH_HALF, ARCH_TOP)),
-                      "Limestone", "Limestone", "Limestone"))
+        rooms.append(
+            (
+                *_ordered((side * WING_X0, -WING_Y, 0), (side * WING_X1, WING_Y, ROOM_TOP)),
+                low_wall,
+                "Oak parquet",
+                "Ceiling",
+            )
+        )
+        rooms.append(
+            (
+                *_ordered((side * WING_X0, -WING_Y, LOGGIA_FLOOR), (side * WING_X1, WING_Y, LOGGIA_TOP)),
+                high_wall,
+                "Oak parquet",
+                "Ceiling",
+            )
+        )
+        rooms.append(
+            (
+                *_ordered((side * HALL_X, -DOOR_HALF, 0), (side * WING_X0, DOOR_HALF, DOOR_TOP)),
+                "Limestone",
+                "Limestone",
+                "Limestone",
+            )
+        )
+        rooms.append(
+            (
+                *_ordered((side * HALL_X, -ARCH_HALF, LOGGIA_FLOOR), (side * WING_X0, ARCH_HALF, ARCH_TOP)),
+                "Limestone",
+                "Limestone",
+                "Limestone",
+            )
+        )
     (x0, y0), (x1, y1) = STAIR_WELL
     rooms.append(((x0, y0, ROOM_TOP), (x1, y1, LOGGIA_FLOOR), "Ceiling", "Ceiling", "Ceiling"))
     return carved(outer, rooms, "Exterior")
@@ -71,8 +95,10 @@ def arches() -> Solid:
     parts = []
     for side, low_wall, high_wall in ((-1, "Crimson wall", "Ochre wall"), (1, "Teal wall", "Green wall")):
         x0, x1 = sorted((side * HALL_X, side * WING_X0))
-        for half, spring, rise, top, foot, wall in ((DOOR_HALF, DOOR_SPRING, DOOR_RISE, DOOR_TOP, 0.0, low_wall),
-                                                    (ARCH_HALF, ARCH_SPRING, ARCH_RISE, ARCH_TOP, LOGGIA_FLOOR, high_wall)):
+        for half, spring, rise, top, foot, wall in (
+            (DOOR_HALF, DOOR_SPRING, DOOR_RISE, DOOR_TOP, 0.0, low_wall),
+            (ARCH_HALF, ARCH_SPRING, ARCH_RISE, ARCH_TOP, LOGGIA_FLOOR, high_wall),
+        ):
             faces = (wall, "Plaster") if side < 0 else ("Plaster", wall)
             parts.append(arch_filling(x0, x1, half, spring, rise, top, (*faces, "Limestone")))
             parts.append(arch_frame(x0 - 0.05, x0, half, foot, spring, rise, 0.16, "Limestone"))
@@ -88,8 +114,19 @@ def vault() -> Solid:
 def cornice() -> Solid:
     """The hall's cornice, hollowed on top for the cove light."""
     foot, top = CORNICE_FOOT, VAULT_SPRING
-    profile = [(0, foot), (0.06, foot), (0.08, foot + 0.08), (0.16, foot + 0.16), (0.18, foot + 0.3), (0.30, foot + 0.38),
-               (0.34, foot + 0.46), (0.34, top - 0.02), (0.29, top - 0.02), (0.29, top - 0.14), (0, top - 0.14)]
+    profile = [
+        (0, foot),
+        (0.06, foot),
+        (0.08, foot + 0.08),
+        (0.16, foot + 0.16),
+        (0.18, foot + 0.3),
+        (0.30, foot + 0.38),
+        (0.34, foot + 0.46),
+        (0.34, top - 0.02),
+        (0.29, top - 0.02),
+        (0.29, top - 0.14),
+        (0, top - 0.14),
+    ]
     return ring_moulding((-HALL_X, -HALL_Y), (HALL_X, HALL_Y), profile, "Ceiling")
 
 
@@ -112,8 +149,14 @@ def trim() -> Solid:
         parts.append(_along_walls(low, high, (2.86, 2.92), 0.035, "Walnut", west, east))
         west, east = ((), arch) if side < 0 else (arch, ())
         parts.append(_along_walls(low, high, (LOGGIA_FLOOR, LOGGIA_FLOOR + 0.14), 0.02, "Walnut", west, east))
-        profile = [(0, LOGGIA_TOP - 0.3), (0.05, LOGGIA_TOP - 0.3), (0.08, LOGGIA_TOP - 0.18), (0.22, LOGGIA_TOP - 0.06),
-                   (0.22, LOGGIA_TOP), (0, LOGGIA_TOP)]
+        profile = [
+            (0, LOGGIA_TOP - 0.3),
+            (0.05, LOGGIA_TOP - 0.3),
+            (0.08, LOGGIA_TOP - 0.18),
+            (0.22, LOGGIA_TOP - 0.06),
+            (0.22, LOGGIA_TOP),
+            (0, LOGGIA_TOP),
+        ]
         parts.append(ring_moulding(low, high, profile, "Ceiling"))
     return _joined(parts)
 
@@ -121,8 +164,10 @@ def trim() -> Solid:
 def railings() -> Solid:
     """Balustrades of the loggias and around the stair well."""
     middle = (HALL_X + WING_X0) / 2
-    parts = [balustrade((side * middle, -ARCH_HALF), (side * middle, ARCH_HALF), LOGGIA_FLOOR, 1.0, "Limestone", 0.3)
-             for side in (-1, 1)]
+    parts = [
+        balustrade((side * middle, -ARCH_HALF), (side * middle, ARCH_HALF), LOGGIA_FLOOR, 1.0, "Limestone", 0.3)
+        for side in (-1, 1)
+    ]
     (x0, y0), (x1, y1) = STAIR_WELL
     parts.append(balustrade((x0 - 0.08, y0), (x0 - 0.08, y1), LOGGIA_FLOOR, 0.95, "Walnut"))
     parts.append(balustrade((x0, y0 - 0.08), (x0 + 1.1, y0 - 0.08), LOGGIA_FLOOR, 0.95, "Walnut"))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The closed solids that the demo gallery is built from.
 
-Every function returns a ``Solid``: a closed surface with outward normals (counter-clockwise faces), in metres. Solids add
-up with ``+``; ``Solid.to_mesh`` makes the Blender mesh, with UVs projected along each face's main axis.
+Every function returns a ``Solid``: a closed surface with outward normals (counter-clockwise faces), in metres. Solids
+add up with ``+``; ``Solid.to_mesh`` makes the Blender mesh, with UVs projected along each face's main axis.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import bpy  # first, because the wheel brings bmesh with it
+
 import bmesh  # isort: skip
 import numpy as np
 
@@ -28,8 +29,12 @@ class Solid:
     def __add__(self, other: Solid) -> Solid:
         shift = len(self.vertices)
         moved = [tuple(index + shift for index in face) for face in other.faces]
-        return Solid(np.concatenate([self.vertices, other.vertices]), self.faces + moved,
-                     self.materials + other.materials, self.smooth)
+        return Solid(
+            np.concatenate([self.vertices, other.vertices]),
+            self.faces + moved,
+            self.materials + other.materials,
+            self.smooth,
+        )
 
     def at(self, x: float, y: float, z: float, turn: float = 0.0) -> Solid:
         """A copy turned by ``turn`` radians about Z, then moved to (x, y, z)."""
@@ -88,8 +93,10 @@ def carved(outer: list[tuple], rooms: list[tuple], outside: str) -> Solid:
     label = np.zeros([len(line) + 1 for line in lines], int)
 
     def cells(low, high):
-        return tuple(slice(np.searchsorted(line, a - 1e-6) + 1, np.searchsorted(line, b - 1e-6) + 1)
-                     for line, a, b in zip(lines, low, high))
+        return tuple(
+            slice(np.searchsorted(line, a - 1e-6) + 1, np.searchsorted(line, b - 1e-6) + 1)
+            for line, a, b in zip(lines, low, high)
+        )
 
     for low, high in outer:
         label[cells(low, high)] = -1
@@ -117,7 +124,7 @@ def carved(outer: list[tuple], rooms: list[tuple], outside: str) -> Solid:
             slot = 2 if axis != 2 else (3 if side else 4)
             materials += [rooms[number - 1][slot] if number else outside for number in front[bare]]
 
-    quads = np.concatenate([np.stack(corners[4 * n:4 * n + 4], axis=1) for n in range(6)])  # (F, 4, 3)
+    quads = np.concatenate([np.stack(corners[4 * n : 4 * n + 4], axis=1) for n in range(6)])  # (F, 4, 3)
     lattice, index = np.unique(quads.reshape(-1, 3), axis=0, return_inverse=True)
     vertices = np.stack([lines[axis][lattice[:, axis]] for axis in range(3)], axis=1)
     return Solid(vertices, [tuple(face) for face in index.reshape(-1, 4).tolist()], materials)
@@ -160,11 +167,13 @@ def circle(radius: float, sides: int) -> np.ndarray:
     return radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
-def turned(profile, material: str, sides: int = 24, twist: float = 0.0, lobes: int = 0, depth: float = 0.0,
-           smooth: bool = True) -> Solid:
+def turned(
+    profile, material: str, sides: int = 24, twist: float = 0.0, lobes: int = 0, depth: float = 0.0, smooth: bool = True
+) -> Solid:
     """A lathe shape: ``profile`` holds (radius, height) pairs, capped at both ends.
 
-    ``twist`` radians of turn over the height and ``lobes`` waves of relative ``depth`` make it a twisted, fluted column.
+    ``twist`` radians of turn over the height and ``lobes`` waves of relative ``depth`` make it a twisted, fluted
+    column.
     """
     profile = np.asarray(profile, float)
     turn = twist * (profile[:, 1] - profile[0, 1]) / np.ptp(profile[:, 1])
@@ -183,8 +192,7 @@ def spline(points, count: int) -> np.ndarray:
     start = np.minimum(where.astype(int), len(points) - 2)
     t = (where - start)[:, None]
     p0, p1, p2, p3 = (padded[start + offset] for offset in range(4))
-    return 0.5 * (2 * p1 + (p2 - p0) * t + (2 * p0 - 5 * p1 + 4 * p2 - p3) * t**2
-                  + (3 * p1 - p0 - 3 * p2 + p3) * t**3)
+    return 0.5 * (2 * p1 + (p2 - p0) * t + (2 * p0 - 5 * p1 + 4 * p2 - p3) * t**2 + (3 * p1 - p0 - 3 * p2 + p3) * t**3)
 
 
 def tube(path: np.ndarray, radius: float, sides: int, material: str, closed: bool = False) -> Solid:
@@ -237,8 +245,12 @@ def ring_moulding(low, high, profile, material: str) -> Solid:
     """
     profile = np.asarray(profile, float)
     sections = []
-    for x, y, sx, sy in ((low[0], low[1], 1, 1), (high[0], low[1], -1, 1), (high[0], high[1], -1, -1),
-                         (low[0], high[1], 1, -1)):
+    for x, y, sx, sy in (
+        (low[0], low[1], 1, 1),
+        (high[0], low[1], -1, 1),
+        (high[0], high[1], -1, -1),
+        (low[0], high[1], 1, -1),
+    ):
         sections.append(np.stack([x + sx * profile[:, 0], y + sy * profile[:, 0], profile[:, 1]], axis=1))
     return lofted(np.array(sections), material, closed=True)
 
@@ -249,8 +261,9 @@ def arch_curve(half_width: float, spring: float, rise: float, count: int) -> np.
     return np.stack([half_width * np.cos(angle), spring + rise * np.sin(angle)], axis=1)
 
 
-def arch_filling(x0: float, x1: float, half_width: float, spring: float, rise: float, top: float,
-                 materials: tuple[str, str, str]) -> Solid:
+def arch_filling(
+    x0: float, x1: float, half_width: float, spring: float, rise: float, top: float, materials: tuple[str, str, str]
+) -> Solid:
     """What turns a rectangular opening up to ``top`` in the wall x0–x1 into an arch.
 
     ``materials``: face towards −x, face towards +x, soffit.
@@ -264,9 +277,11 @@ def arch_filling(x0: float, x1: float, half_width: float, spring: float, rise: f
     return lofted(sections, [soffit, plus, soffit, minus])
 
 
-def arch_frame(x0: float, x1: float, half_width: float, foot: float, spring: float, rise: float, width: float,
-               material: str) -> Solid:
+def arch_frame(
+    x0: float, x1: float, half_width: float, foot: float, spring: float, rise: float, width: float, material: str
+) -> Solid:
     """A moulding of ``width`` around an arched opening, from x0 to x1, standing on z = ``foot``."""
+
     def outline(grow):
         curve = arch_curve(half_width + grow, spring, rise + grow, 17)
         ends = np.array([[-half_width - grow, foot]]), np.array([[half_width + grow, foot]])
@@ -277,8 +292,16 @@ def arch_frame(x0: float, x1: float, half_width: float, foot: float, spring: flo
     return lofted(sections, material)
 
 
-def coffered_vault(x0: float, x1: float, half_width: float, spring: float, rise: float, top: float,
-                   coffers: tuple[int, int], materials: tuple[str, str]) -> Solid:
+def coffered_vault(
+    x0: float,
+    x1: float,
+    half_width: float,
+    spring: float,
+    rise: float,
+    top: float,
+    coffers: tuple[int, int],
+    materials: tuple[str, str],
+) -> Solid:
     """A segmental barrel vault along x whose underside carries ``coffers`` (along x, along the arc).
 
     The solid fills everything between the underside and z = ``top``. ``materials``: ribs, panels.
@@ -302,13 +325,20 @@ def coffered_vault(x0: float, x1: float, half_width: float, spring: float, rise:
             underside.append(polygon)
     made.normal_update()
     size = min((x1 - x0) / coffers[0], radius * 2 * opening / coffers[1])
-    for thickness, depth in ((0.14 * size, 0.0), (0.02 * size, -0.08 * size), (0.08 * size, 0.0), (0.02 * size, -0.08 * size)):
+    for thickness, depth in (
+        (0.14 * size, 0.0),
+        (0.02 * size, -0.08 * size),
+        (0.08 * size, 0.0),
+        (0.02 * size, -0.08 * size),
+    ):
         bmesh.ops.inset_individual(made, faces=underside, thickness=thickness, depth=depth)
     made.verts.index_update()
     panels = set(underside)
-    solid = Solid(np.array([vertex.co for vertex in made.verts]),
-                  [tuple(vertex.index for vertex in face.verts) for face in made.faces],
-                  [panel if face in panels else rib for face in made.faces])
+    solid = Solid(
+        np.array([vertex.co for vertex in made.verts]),
+        [tuple(vertex.index for vertex in face.verts) for face in made.faces],
+        [panel if face in panels else rib for face in made.faces],
+    )
     made.free()
     return solid
 
@@ -323,9 +353,13 @@ def spiral_stair(height: float, steps: int, sweep: float, inner: float, outer: f
         angle = index * step + bends
         top = (index + 1) * rise
         ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        sections = np.stack([np.concatenate([ring * r, np.full((4, 1), z)], axis=1)
-                             for r, z in ((inner * 0.8, top - 0.06), (outer, top - 0.06), (outer, top), (inner * 0.8, top))],
-                            axis=1)
+        sections = np.stack(
+            [
+                np.concatenate([ring * r, np.full((4, 1), z)], axis=1)
+                for r, z in ((inner * 0.8, top - 0.06), (outer, top - 0.06), (outer, top), (inner * 0.8, top))
+            ],
+            axis=1,
+        )
         solid = solid + lofted(sections, tread)
         middle = (index + 0.5) * step
         x, y = (outer - 0.05) * np.cos(middle), (outer - 0.05) * np.sin(middle)
@@ -340,7 +374,8 @@ def spiral_stair(height: float, steps: int, sweep: float, inner: float, outer: f
 
 
 def balustrade(start, end, z: float, height: float, material: str, spacing: float = 0.32) -> Solid:
-    """Turned balusters between a plinth and a handrail from ``start`` to ``end`` (x, y), one of them equal in x or y."""
+    """Turned balusters between a plinth and a handrail from ``start`` to ``end`` (x, y), one of them equal in x or
+    y."""
     start, end = np.asarray(start, float), np.asarray(end, float)
     along = end - start
     across = np.array([along[1] != 0, along[0] != 0], float) * 0.07

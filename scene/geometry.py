@@ -44,10 +44,16 @@ def read_mesh(mesh: bpy.types.Mesh) -> MeshArrays:
     """Read an evaluated mesh. Triangles without area and those with a corner that is not finite are dropped and
     counted.
     """
-    vertices = _read(mesh.attributes["position"].data, "vector", (len(mesh.vertices), 3), np.float32) if mesh.vertices \
+    vertices = (
+        _read(mesh.attributes["position"].data, "vector", (len(mesh.vertices), 3), np.float32)
+        if mesh.vertices
         else np.empty((0, 3), np.float32)
-    corner_vertices = _read(mesh.attributes[".corner_vert"].data, "value", (len(mesh.loops),), np.int32) if mesh.loops \
+    )
+    corner_vertices = (
+        _read(mesh.attributes[".corner_vert"].data, "value", (len(mesh.loops),), np.int32)
+        if mesh.loops
         else np.empty(0, np.int32)
+    )
     corners, faces = _triangulation(mesh)
     arrays = MeshArrays(
         vertices=vertices.astype(float),
@@ -85,8 +91,9 @@ def place(mesh: MeshArrays, corner_uvs: np.ndarray, matrices: np.ndarray) -> Wor
     uvs = np.repeat(corner_uvs[None], count, axis=0)
     uvs[mirrored] = uvs[mirrored][:, :, [0, 2, 1]]
     triangles += (np.arange(count, dtype=np.int32) * vertex_count)[:, None, None]
-    world = WorldTriangles(vertices.reshape(-1, 3), triangles.reshape(-1, 3), normals.reshape(-1, 3, 3),
-                           uvs.reshape(-1, 3, 2))
+    world = WorldTriangles(
+        vertices.reshape(-1, 3), triangles.reshape(-1, 3), normals.reshape(-1, 3, 3), uvs.reshape(-1, 3, 2)
+    )
     _normalise(world)
     return world
 
@@ -164,9 +171,14 @@ def _has_area(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Row-wise cross product; several times faster than numpy's on a million rows."""
-    return np.stack([u[:, 1] * v[:, 2] - u[:, 2] * v[:, 1],
-                     u[:, 2] * v[:, 0] - u[:, 0] * v[:, 2],
-                     u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]], axis=1)
+    return np.stack(
+        [
+            u[:, 1] * v[:, 2] - u[:, 2] * v[:, 1],
+            u[:, 2] * v[:, 0] - u[:, 0] * v[:, 2],
+            u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0],
+        ],
+        axis=1,
+    )
 
 
 def _normalise(world: WorldTriangles) -> None:

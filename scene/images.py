@@ -72,8 +72,10 @@ class ImageTable:
             self._notices.append(f"image '{image.name}' is a {image.source.lower()}: only its current frame is used")
         width, height = image.size  # asking for the size makes Blender load the file
         if not (width and height and image.has_data):
-            self._notices.append(f"image '{image.name}' of {user} is missing: the socket's own value is used instead; "
-                                  "find it with File > External Data or pack it into the file")
+            self._notices.append(
+                f"image '{image.name}' of {user} is missing: the socket's own value is used instead; "
+                "find it with File > External Data or pack it into the file"
+            )
             return None
         encoded = np.empty((height, width, image.channels), np.float32)
         image.pixels.foreach_get(encoded.ravel())
@@ -83,7 +85,7 @@ class ImageTable:
         covers = image.alpha_mode != "CHANNEL_PACKED"  # else the fourth channel has nothing to do with the other three
         bands = []
         for start in range(0, height, _CHUNK_ROWS):
-            band = _to_rgba(encoded[start:start + _CHUNK_ROWS], table, image)
+            band = _to_rgba(encoded[start : start + _CHUNK_ROWS], table, image)
             if covers:
                 band[..., :3] *= band[..., 3:]  # filtered premultiplied: holes do not stain their rims
             bands.append(_box_filter(band, columns, axis=1))

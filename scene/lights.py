@@ -68,8 +68,12 @@ def _read_light(item, matrix, name, node_tint, notices) -> Light | None:
     if (color < 0).any():
         notices.append(f"light '{name}' has negative power: it takes light away, as in Cycles")
     values = {
-        "name": name, "kind": data.type, "matrix": frame, "casts_shadow": bool(data.use_shadow),
-        "dynamic": is_dynamic(item), "group": str(item.get(GROUP_PROPERTY, "")),
+        "name": name,
+        "kind": data.type,
+        "matrix": frame,
+        "casts_shadow": bool(data.use_shadow),
+        "dynamic": is_dynamic(item),
+        "group": str(item.get(GROUP_PROPERTY, "")),
     }
     kind = _KINDS[data.type](data, scale)
     values["color"] = tuple(float(value) for value in color * kind.pop("unit"))
@@ -121,8 +125,12 @@ def _point(data, _scale) -> dict:
 
 
 def _spot(data, scale) -> dict:
-    return {**_point(data, scale), "spot_size": float(data.spot_size), "spot_blend": float(data.spot_blend),
-            "spot_scale": tuple(float(value) for value in np.where(scale > 0, scale, 1.0))}
+    return {
+        **_point(data, scale),
+        "spot_size": float(data.spot_size),
+        "spot_blend": float(data.spot_blend),
+        "spot_scale": tuple(float(value) for value in np.where(scale > 0, scale, 1.0)),
+    }
 
 
 def _sun(data, _scale) -> dict:

@@ -57,8 +57,9 @@ class MaterialTable:
     def _closure(self, material: bpy.types.Material) -> Closure:
         if material.node_tree is None or not material.use_nodes:
             return Closure(constant(material.diffuse_color[:3]), constant(1.0))
-        evaluator = NodeEvaluator(f"material '{material.name}'", self._images, self._notices, material.name,
-                                  sampler_of(material))
+        evaluator = NodeEvaluator(
+            f"material '{material.name}'", self._images, self._notices, material.name, sampler_of(material)
+        )
         output = active_output(material.node_tree, "ShaderNodeOutputMaterial")
         if output is None:
             self._notices.group("materials without an output node are black", material.name)
@@ -76,11 +77,16 @@ class MaterialTable:
 
     def _append(self, name: str, closure: Closure, threshold: float, backface_culling: bool) -> None:
         opacity = _solid_where_opaque(closure.opacity, threshold)
-        placed = [value for value in (closure.diffuse, opacity, closure.emission)
-                  if not value.is_constant and value.domain.uv_map is not None]
+        placed = [
+            value
+            for value in (closure.diffuse, opacity, closure.emission)
+            if not value.is_constant and value.domain.uv_map is not None
+        ]
         domain = placed[0].domain if placed else Domain()
-        diffuse, opacity, emission = (self._in_domain(name, role, value, domain) for role, value in (
-            ("base colour", closure.diffuse), ("alpha", opacity), ("emission", closure.emission)))
+        diffuse, opacity, emission = (
+            self._in_domain(name, role, value, domain)
+            for role, value in (("base colour", closure.diffuse), ("alpha", opacity), ("emission", closure.emission))
+        )
         if opacity.is_constant and opacity.number() < threshold and not emission.is_zero():
             self._notices.group("emission on a transparent surface is kept and the surface blocks light", name)
             diffuse, opacity = constant([0.0, 0.0, 0.0]), ONE
@@ -90,17 +96,19 @@ class MaterialTable:
 
         base_image, alpha_image = self._base_images(name, diffuse, opacity)
         self.domains.append(domain)
-        self.materials.append(Material(
-            name=name,
-            base_color=_color(diffuse),
-            emission=_color(emission),
-            base_image=base_image,
-            alpha_image=alpha_image,
-            emission_image=NO_IMAGE if emission.is_constant else self._add(f"{name} emission", emission, None),
-            alpha=opacity.number() if opacity.is_constant else 1.0,
-            alpha_threshold=0.0 if opacity.is_constant and opacity.number() >= threshold else threshold,
-            backface_culling=backface_culling,
-        ))
+        self.materials.append(
+            Material(
+                name=name,
+                base_color=_color(diffuse),
+                emission=_color(emission),
+                base_image=base_image,
+                alpha_image=alpha_image,
+                emission_image=NO_IMAGE if emission.is_constant else self._add(f"{name} emission", emission, None),
+                alpha=opacity.number() if opacity.is_constant else 1.0,
+                alpha_threshold=0.0 if opacity.is_constant and opacity.number() >= threshold else threshold,
+                backface_culling=backface_culling,
+            )
+        )
 
     def _in_domain(self, name: str, role: str, value: Value, domain: Domain) -> Value:
         """``value`` as it can be sampled with the material's one mapping: textures that lie elsewhere become their
@@ -117,13 +125,17 @@ class MaterialTable:
         if opacity.is_constant:
             return (NO_IMAGE if diffuse.is_constant else self._add(name, diffuse, None)), NO_IMAGE
         whole = self._images.whole(opacity.pixels)
-        if whole is not None and float(opacity.scale[0]) == 1 and (
-                diffuse.is_constant or self._images.whole(diffuse.pixels) is whole):
+        if (
+            whole is not None
+            and float(opacity.scale[0]) == 1
+            and (diffuse.is_constant or self._images.whole(diffuse.pixels) is whole)
+        ):
             index = self._images.add(name, whole, opacity.domain.extension)
             return (NO_IMAGE if diffuse.is_constant else index), index
         if diffuse.is_constant:
-            return NO_IMAGE, self._add(f"{name} alpha", Value(np.ones(3, np.float32), np.ones_like(opacity.pixels),
-                                                              opacity.domain), opacity)
+            return NO_IMAGE, self._add(
+                f"{name} alpha", Value(np.ones(3, np.float32), np.ones_like(opacity.pixels), opacity.domain), opacity
+            )
         index = self._add(name, diffuse, opacity)
         return index, index
 
@@ -162,6 +174,7 @@ def _color(value: Value) -> tuple[float, float, float]:
 
 def _rgba(color: Value, opacity: Value | None) -> np.ndarray:
     """(height, width, 4) float32: the pixels of ``color`` without its factor, ``opacity`` as alpha."""
+
     def join(rgb, alpha):
         shape = np.broadcast_shapes(rgb.shape[:2], alpha.shape[:2])
         return np.concatenate(

@@ -20,8 +20,9 @@ _DISPLAY_SHARE = 0.06  # of the shortest cell edge: visible, and far from touchi
 _NAME_BYTES = 48  # Blender cuts names at 63 bytes; this leaves room for the index
 
 
-def place_probes(scene: bpy.types.Scene, grid: Grid, state: np.ndarray,
-                 volume_object: bpy.types.Object | None = None) -> bpy.types.Collection:
+def place_probes(
+    scene: bpy.types.Scene, grid: Grid, state: np.ndarray, volume_object: bpy.types.Object | None = None
+) -> bpy.types.Collection:
     """Places an Empty at every active probe of ``grid`` and returns the collection that holds them.
 
     Probes that this volume has in the scene already are replaced. ``state`` (P,) holds the states of
@@ -55,8 +56,9 @@ def clear_probes(scene: bpy.types.Scene, volume: str | None = None) -> int:
     root = _find(scene, "")
     if root is None:
         return 0
-    gone = [probe for probe in root.all_objects
-            if VOLUME_PROPERTY in probe and volume in (None, probe[VOLUME_PROPERTY])]
+    gone = [
+        probe for probe in root.all_objects if VOLUME_PROPERTY in probe and volume in (None, probe[VOLUME_PROPERTY])
+    ]
     bpy.data.batch_remove(gone)
     for collection in [*root.children_recursive, root]:
         if _COLLECTION_MARK in collection and not collection.all_objects and not collection.children:

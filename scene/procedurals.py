@@ -55,8 +55,11 @@ def sampler_of(material: bpy.types.Material):
         pixels = render_socket(material, socket, scope, edge, uv_map)
         if socket.type == "VALUE":
             pixels = np.ascontiguousarray(pixels[..., :1])
-        reason = ("procedural textures on UVs become images of the first UV tile" if placed
-                  else "procedural textures enter with their mean colour")
+        reason = (
+            "procedural textures on UVs become images of the first UV tile"
+            if placed
+            else "procedural textures enter with their mean colour"
+        )
         if origins:  # without any, the node only computes
             evaluator.notices.group(reason, f"{evaluator.owner_name} > {socket.node.name}")
         return Value(np.ones(1, np.float32), pixels, Domain(uv_map) if placed else SCATTERED)

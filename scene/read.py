@@ -20,8 +20,13 @@ from .volumes import find_volumes
 from .world import read_world
 
 # Converted curves, text, surfaces and metaballs arrive as separate mesh instances of the same object.
-_WITHOUT_SURFACE = {"VOLUME": "volumes", "POINTCLOUD": "point clouds", "CURVES": "hair curves",
-                    "GREASEPENCIL": "grease pencil", "GPENCIL": "grease pencil"}
+_WITHOUT_SURFACE = {
+    "VOLUME": "volumes",
+    "POINTCLOUD": "point clouds",
+    "CURVES": "hair curves",
+    "GREASEPENCIL": "grease pencil",
+    "GPENCIL": "grease pencil",
+}
 
 
 @dataclass
@@ -75,8 +80,11 @@ def read_scene(
 
 def _read(scene, view_layer, evaluate) -> SceneSnapshot:
     notices = Notices()
-    harvest = evaluate(scene, view_layer, lambda depsgraph: _harvest(
-        depsgraph, rendered_objects(view_layer), scene.rigidbody_world is not None, notices))
+    harvest = evaluate(
+        scene,
+        view_layer,
+        lambda depsgraph: _harvest(depsgraph, rendered_objects(view_layer), scene.rigidbody_world is not None, notices),
+    )
     images = ImageTable(notices)
     materials = MaterialTable(images, notices)
     override = view_layer.material_override
@@ -106,9 +114,7 @@ def _read(scene, view_layer, evaluate) -> SceneSnapshot:
     )
 
 
-def _harvest(
-    depsgraph: bpy.types.Depsgraph, rendered: set[int], rigid_bodies: bool, notices: Notices
-) -> _Harvest:
+def _harvest(depsgraph: bpy.types.Depsgraph, rendered: set[int], rigid_bodies: bool, notices: Notices) -> _Harvest:
     """Take meshes, lights and their places out of ``depsgraph``.
 
     Args:
@@ -234,9 +240,12 @@ def _joined(parts: list[dict]) -> dict:
     """One array per field; vertex indices move behind the parts before."""
     if not parts:
         return {
-            "vertices": np.empty((0, 3)), "triangles": np.empty((0, 3), np.int32),
-            "corner_normals": np.empty((0, 3, 3), np.float32), "corner_uvs": np.empty((0, 3, 2), np.float32),
-            "material_index": np.empty(0, np.int32), "object_index": np.empty(0, np.int32),
+            "vertices": np.empty((0, 3)),
+            "triangles": np.empty((0, 3), np.int32),
+            "corner_normals": np.empty((0, 3, 3), np.float32),
+            "corner_uvs": np.empty((0, 3, 2), np.float32),
+            "material_index": np.empty(0, np.int32),
+            "object_index": np.empty(0, np.int32),
         }
     offset = 0
     for part in parts:

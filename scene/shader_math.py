@@ -38,11 +38,14 @@ def hsv_to_rgb(hsv: np.ndarray) -> np.ndarray:
 
 def hue_saturation(hue, saturation, value, factor, color):
     hsv = rgb_to_hsv(color)
-    shifted = np.stack([
-        (hsv[..., 0] + hue[..., 0] + 0.5) % 1,
-        np.clip(hsv[..., 1] * saturation[..., 0], 0, 1),
-        hsv[..., 2] * value[..., 0],
-    ], -1)
+    shifted = np.stack(
+        [
+            (hsv[..., 0] + hue[..., 0] + 0.5) % 1,
+            np.clip(hsv[..., 1] * saturation[..., 0], 0, 1),
+            hsv[..., 2] * value[..., 0],
+        ],
+        -1,
+    )
     return np.maximum(color * (1 - factor) + hsv_to_rgb(shifted) * factor, 0)
 
 
@@ -78,12 +81,14 @@ def _dodge(a, b, f):
 
 def _exchange(channels: str):
     """HUE, SATURATION, VALUE, COLOR: take some channels of b in HSV."""
+
     def mix(a, b):
         first, second = rgb_to_hsv(a), rgb_to_hsv(b)
         first, second = np.broadcast_arrays(first, second)
         picked = np.stack([second[..., i] if name in channels else first[..., i] for i, name in enumerate("HSV")], -1)
         keep = (second[..., 1:2] == 0) & ("H" in channels)
         return np.where(keep, a, hsv_to_rgb(picked))
+
     return mix
 
 

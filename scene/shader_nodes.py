@@ -46,8 +46,8 @@ class NodeEvaluator:
         self._values: dict[tuple, Value] = {}
 
     def input(self, node: bpy.types.Node, name: str, scope: Scope | None) -> Value:
-        """Value of the input called ``name``. Where its source is not supported, the input's own value and a warning.
-        """
+        """Value of the input called ``name``. Where its source is not supported, the input's own value and a
+        warning."""
         socket = find_socket(node.inputs, name)
         if socket is None:
             raise Unsupported(f"it has no input '{name}' in this Blender")
@@ -92,8 +92,10 @@ class NodeEvaluator:
         """``function`` of the named inputs, with a warning where textures with different mappings meet."""
         values = [self.input(node, name, scope) for name in names]
         if mixed_domains(*values):
-            self.notices.append(f"{self.owner}: node '{node.name}' joins textures with different mappings; "
-                                "only one keeps its pattern, the others are averaged")
+            self.notices.append(
+                f"{self.owner}: node '{node.name}' joins textures with different mappings; "
+                "only one keeps its pattern, the others are averaged"
+            )
         return apply(function, *values)
 
 
@@ -136,8 +138,9 @@ def _image_texture(evaluator, node, socket, scope):
             raise Unsupported(f"{node.projection.lower()} projection")
         domain = domain_of(evaluator, find_socket(node.inputs, "Vector"), scope, node.extension)
     except Unsupported as reason:
-        evaluator.notices.append(f"{owner}: the mapping of image '{node.image.name}' is not supported ({reason}); "
-                                 "its mean colour is used")
+        evaluator.notices.append(
+            f"{owner}: the mapping of image '{node.image.name}' is not supported ({reason}); its mean colour is used"
+        )
         domain = SCATTERED
     color, alpha = evaluator.images.channels(pixels)
     if socket.name == "Alpha":
@@ -164,8 +167,15 @@ def _mix(evaluator, node, socket, scope):
     else:
         raise Unsupported("it mixes rotations")
     blend_type = node.blend_type if node.data_type == "RGBA" else "MIX"
-    return _mixed(evaluator, node, scope, (factor_name, *names), blend_type, node.clamp_factor,
-                  node.data_type == "RGBA" and node.clamp_result)
+    return _mixed(
+        evaluator,
+        node,
+        scope,
+        (factor_name, *names),
+        blend_type,
+        node.clamp_factor,
+        node.data_type == "RGBA" and node.clamp_result,
+    )
 
 
 def _mix_rgb(evaluator, node, socket, scope):
@@ -176,8 +186,12 @@ def _mixed(evaluator, node, scope, names, blend_type, clamp_factor, clamp_result
     factor, first, second = (evaluator.input(node, name, scope) for name in names)
     if clamp_factor:
         factor = apply(lambda f: np.clip(f, 0, 1), factor)
-    if blend_type == "MIX" and factor.is_constant and not clamp_result and (
-            first.is_constant or second.is_constant or factor.scale[0] in (0, 1)):
+    if (
+        blend_type == "MIX"
+        and factor.is_constant
+        and not clamp_result
+        and (first.is_constant or second.is_constant or factor.scale[0] in (0, 1))
+    ):
         return blend(factor, first, second)  # keeps an untouched texture one shared array
 
     def mix(f, a, b):
@@ -190,8 +204,10 @@ def _mixed(evaluator, node, scope, names, blend_type, clamp_factor, clamp_result
         if second.is_constant:
             return first.scaled(second.scale)
     if mixed_domains(factor, first, second):
-        evaluator.notices.append(f"{evaluator.owner}: node '{node.name}' joins textures with different mappings; "
-                                 "only one keeps its pattern, the others are averaged")
+        evaluator.notices.append(
+            f"{evaluator.owner}: node '{node.name}' joins textures with different mappings; "
+            "only one keeps its pattern, the others are averaged"
+        )
     return apply(mix, factor, first, second)
 
 
@@ -228,8 +244,10 @@ def _rgb_curves(evaluator, node, socket, scope):
     mapping.initialize()
     combined, channels = mapping.curves[3], mapping.curves[:3]
     grid = np.linspace(0, 1, 257)
-    tables = [np.array([[mapping.evaluate(curve, mapping.evaluate(combined, x))] for x in grid], np.float32)
-              for curve in channels]
+    tables = [
+        np.array([[mapping.evaluate(curve, mapping.evaluate(combined, x))] for x in grid], np.float32)
+        for curve in channels
+    ]
 
     def function(factor, color):
         color = _rgb(color)
@@ -255,8 +273,15 @@ def _map_range(evaluator, node, socket, scope):
     if node.data_type != "FLOAT" or node.interpolation_type == "STEPPED":
         raise Unsupported("only Float without steps")
     return evaluator.per_pixel(
-        node, scope, lambda *inputs: shader_math.map_range(*inputs, node.interpolation_type, node.clamp),
-        "Value", "From Min", "From Max", "To Min", "To Max")
+        node,
+        scope,
+        lambda *inputs: shader_math.map_range(*inputs, node.interpolation_type, node.clamp),
+        "Value",
+        "From Min",
+        "From Max",
+        "To Min",
+        "To Max",
+    )
 
 
 def _clamp(evaluator, node, socket, scope):
@@ -325,8 +350,11 @@ def _object_info(evaluator, node, socket, scope):
 
 
 def _light_falloff(evaluator, node, socket, scope):
-    if socket.name == "Quadratic" and not evaluator.linked(node, "Smooth", scope) and evaluator.input(
-            node, "Smooth", scope).is_zero():
+    if (
+        socket.name == "Quadratic"
+        and not evaluator.linked(node, "Smooth", scope)
+        and evaluator.input(node, "Smooth", scope).is_zero()
+    ):
         return evaluator.input(node, "Strength", scope)
     raise Unsupported("only quadratic falloff without smoothing is physical")
 
@@ -379,4 +407,3 @@ def blackbody_color(kelvin: float) -> np.ndarray:
         return np.array(light.temperature_color, float)
     finally:
         bpy.data.lights.remove(light)
-

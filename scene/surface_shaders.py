@@ -76,8 +76,9 @@ def _principled(evaluator, node, scope):
     if not metallic.is_zero():
         diffuse = multiply(diffuse, complement(metallic))
         if metallic.number() > 0.5:
-            evaluator.notices.group("metallic materials reflect no diffuse light and so look dark to the probes",
-                                    evaluator.owner_name)
+            evaluator.notices.group(
+                "metallic materials reflect no diffuse light and so look dark to the probes", evaluator.owner_name
+            )
     opacity = value("Alpha")
     if transmission > 0.5:
         evaluator.notices.group("glass lets light through unbent and uncoloured", evaluator.owner_name)
@@ -90,8 +91,11 @@ def _principled(evaluator, node, scope):
 
 
 def _eevee_specular(evaluator, node, scope):
-    return Closure(evaluator.input(node, "Base Color", scope), complement(evaluator.input(node, "Transparency", scope)),
-                   evaluator.input(node, "Emissive Color", scope))
+    return Closure(
+        evaluator.input(node, "Base Color", scope),
+        complement(evaluator.input(node, "Transparency", scope)),
+        evaluator.input(node, "Emissive Color", scope),
+    )
 
 
 def _diffuse(evaluator, node, scope):

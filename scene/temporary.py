@@ -59,7 +59,11 @@ def scene_copy(scene: bpy.types.Scene, frame: int | None = None) -> Iterator[bpy
             copy.frame_set(frame)
         plain_render_settings(copy)
         copy.camera = new_camera(copy)
-        yield copy
+        try:
+            yield copy
+        finally:
+            # Cycles frees what it keeps of the scene now; later it would look for a scene that is gone, and crash.
+            copy.render.use_persistent_data = False
 
 
 def new_camera(scene: bpy.types.Scene) -> bpy.types.Object:

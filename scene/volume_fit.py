@@ -31,9 +31,7 @@ _PROBES = 1000  # about so many nodes inside the bounds by default
 _ROUND_STEPS = np.array([1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])
 
 
-def fit_volume(
-    snapshot: SceneSnapshot, spacing: float | None = None, resolution: Sequence[int] | None = None
-) -> Grid:
+def fit_volume(snapshot: SceneSnapshot, spacing: float | None = None, resolution: Sequence[int] | None = None) -> Grid:
     """An axis-aligned grid around what matters in ``snapshot``.
 
     Args:
@@ -116,11 +114,18 @@ def _without_backdrops(snapshot, lows, highs, present) -> np.ndarray:
     rest_low = np.minimum.accumulate(lows[order][::-1], axis=0)[::-1]
     rest_high = np.maximum.accumulate(highs[order][::-1], axis=0)[::-1]
     emitters = _only_emitting(snapshot)
-    for place, item in enumerate(order[:int(present.sum()) - 1]):
+    for place, item in enumerate(order[: int(present.sum()) - 1]):
         rest = np.linalg.norm(rest_high[place + 1] - rest_low[place + 1])
         thickness = (highs[item] - lows[item]).min() / sizes[item]
-        limit = (_FLAT_BACKDROP if thickness < _FLAT else _SKY_BACKDROP if item in emitters
-                 else _LOW_BACKDROP if thickness < _LOW else np.inf)
+        limit = (
+            _FLAT_BACKDROP
+            if thickness < _FLAT
+            else _SKY_BACKDROP
+            if item in emitters
+            else _LOW_BACKDROP
+            if thickness < _LOW
+            else np.inf
+        )
         if sizes[item] <= limit * rest:
             break
         kept[item] = False

@@ -14,7 +14,8 @@ ROOT = Path(__file__).resolve().parent.parent
 
 def _load_package():
     spec = importlib.util.spec_from_file_location(
-        "gridlight", ROOT / "__init__.py", submodule_search_locations=[str(ROOT)])
+        "gridlight", ROOT / "__init__.py", submodule_search_locations=[str(ROOT)]
+    )
     package = importlib.util.module_from_spec(spec)
     sys.modules["gridlight"] = package
     spec.loader.exec_module(package)
@@ -47,7 +48,8 @@ def root() -> Path:
 
 @pytest.fixture(scope="session")
 def run_gridlight():
-    """Runs ``gridlight`` with arguments in this environment's Python; returns the completed process with text output."""
+    """Runs ``gridlight`` with arguments in this environment's Python; returns the completed process with text
+    output."""
 
     def run(*arguments, **options):
         options = {"capture_output": True, "text": True, "timeout": 600, **options}
@@ -66,12 +68,15 @@ def gpu_context():
         f"spec = importlib.util.spec_from_file_location('start', {str(ROOT / 'cli' / '__main__.py')!r})\n"
         "start = importlib.util.module_from_spec(spec); spec.loader.exec_module(start); start.load_package()\n"
         "from gridlight.gpu_shaders.context import ensure_context\n"
-        "ensure_context(); sys.stdout.flush(); os._exit(0)\n")
+        "ensure_context(); sys.stdout.flush(); os._exit(0)\n"
+    )
     command = [sys.executable, "-I", "-c", program]
     attempt = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     if attempt.returncode != 0:
-        pytest.fail(f"no GPU context: a Blender process that made one ended with {attempt.returncode}\n"
-                    f"{attempt.stdout}{attempt.stderr}")
+        pytest.fail(
+            f"no GPU context: a Blender process that made one ended with {attempt.returncode}\n"
+            f"{attempt.stdout}{attempt.stderr}"
+        )
     from gridlight.gpu_shaders.context import ensure_context
 
     ensure_context()

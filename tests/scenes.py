@@ -70,23 +70,30 @@ def add_mesh(scene, name: str, vertices, faces, material, matrix=Matrix()) -> bp
 
 
 def add_box(scene, name: str, low, high, material, turn: float = 0.0, inward: bool = False) -> bpy.types.Object:
-    """A box with corners ``low`` and ``high``, turned about the vertical through its middle; ``inward``: normals point inside."""
+    """A box with corners ``low`` and ``high``, turned about the vertical through its middle; ``inward``: normals point
+    inside."""
     low, high = np.asarray(low, float), np.asarray(high, float)
     middle, half = (low + high) / 2, (high - low) / 2
     vertices = [half * (x, y, z) for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)]
     faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
     if inward:
         faces = [face[::-1] for face in faces]
-    return add_mesh(scene, name, vertices, faces, material, Matrix.Translation(Vector(middle)) @ Matrix.Rotation(turn, 4, "Z"))
+    return add_mesh(
+        scene, name, vertices, faces, material, Matrix.Translation(Vector(middle)) @ Matrix.Rotation(turn, 4, "Z")
+    )
 
 
 def add_plane(scene, name: str, middle, axis_u, axis_v, material) -> bpy.types.Object:
     """A rectangle ``middle`` ± ``axis_u`` ± ``axis_v`` that faces u × v."""
     middle, u, v = (np.asarray(value, float) for value in (middle, axis_u, axis_v))
-    return add_mesh(scene, name, [middle - u - v, middle + u - v, middle + u + v, middle - u + v], [(0, 1, 2, 3)], material)
+    return add_mesh(
+        scene, name, [middle - u - v, middle + u - v, middle + u + v, middle - u + v], [(0, 1, 2, 3)], material
+    )
 
 
-def add_light(scene, kind: str, location=(0, 0, 0), rotation=(0, 0, 0), scale=(1, 1, 1), **properties) -> bpy.types.Object:
+def add_light(
+    scene, kind: str, location=(0, 0, 0), rotation=(0, 0, 0), scale=(1, 1, 1), **properties
+) -> bpy.types.Object:
     """A light object; ``properties`` are those of ``bpy.types.Light``."""
     data = bpy.data.lights.new(kind.title(), kind)
     for key, value in properties.items():
@@ -101,7 +108,8 @@ def cornell(walls: str = "thick", boxes: bool = True, light: str = "area") -> bp
     """A closed room 2.8 m wide with a red and a green wall, two boxes and a light under the ceiling.
 
     Args:
-        walls: "thick", six slabs of 20 cm; "planes", six single planes that face inside; "cube", one cube with its normals outside,
+        walls: "thick", six slabs of 20 cm; "planes", six single planes that face inside; "cube", one cube with its
+        normals outside,
             as Blender adds it.
         light: "area", a light object; "strip", an emissive strip 4 cm wide along the ceiling; "spot"; "point".
     """
@@ -126,11 +134,24 @@ def cornell(walls: str = "thick", boxes: bool = True, light: str = "area") -> bp
     if light == "area":
         add_light(scene, "AREA", (middle, middle, size - 0.04), shape="RECTANGLE", size=0.9, size_y=0.6, energy=40.0)
     elif light == "strip":
-        add_box(scene, "Strip", (middle - 0.9, middle - 0.02, size - 0.06), (middle + 0.9, middle + 0.02, size - 0.02),
-                emitter((1.0, 0.9, 0.8), 60.0))
+        add_box(
+            scene,
+            "Strip",
+            (middle - 0.9, middle - 0.02, size - 0.06),
+            (middle + 0.9, middle + 0.02, size - 0.02),
+            emitter((1.0, 0.9, 0.8), 60.0),
+        )
     elif light == "spot":
-        add_light(scene, "SPOT", (0.5, 0.5, 2.5), (0.6, 0.0, -0.8), energy=120.0, spot_size=1.1, spot_blend=0.3,
-                  shadow_soft_size=0.05)
+        add_light(
+            scene,
+            "SPOT",
+            (0.5, 0.5, 2.5),
+            (0.6, 0.0, -0.8),
+            energy=120.0,
+            spot_size=1.1,
+            spot_blend=0.3,
+            shadow_soft_size=0.05,
+        )
     elif light == "point":
         add_light(scene, "POINT", (middle, middle, 2.2), energy=60.0, shadow_soft_size=0.05)
     else:
@@ -163,17 +184,29 @@ def add_room_planes(scene, low, high, materials) -> None:
     """Six planes around the box ``low`` .. ``high`` that face inside; materials of floor, ceiling, +Y, −Y, −X, +X."""
     low, high = np.asarray(low, float), np.asarray(high, float)
     middle, (x, y, z) = (low + high) / 2, np.diag((high - low) / 2)
-    sides = (("Floor", -z, x, y), ("Ceiling", z, y, x), ("Back", y, x, z), ("Front", -y, z, x), ("Left", -x, y, z), ("Right", x, z, y))
+    sides = (
+        ("Floor", -z, x, y),
+        ("Ceiling", z, y, x),
+        ("Back", y, x, z),
+        ("Front", -y, z, x),
+        ("Left", -x, y, z),
+        ("Right", x, z, y),
+    )
     for (name, offset, u, v), material in zip(sides, materials):
         add_plane(scene, name, middle + offset, u, v, material)
 
 
 def add_room_slabs(scene, low, high, thickness: float, materials) -> None:
-    """Six slabs around the box ``low`` .. ``high``, overlapping nowhere; materials of floor, ceiling, +Y, −Y, −X, +X."""
+    """Six slabs around the box ``low`` .. ``high``, overlapping nowhere; materials of floor, ceiling, +Y, −Y, −X,
+    +X."""
     (x0, y0, z0), (x1, y1, z1), t = low, high, thickness
     boxes = (
-        ("Floor", (x0 - t, y0 - t, z0 - t), (x1 + t, y1 + t, z0)), ("Ceiling", (x0 - t, y0 - t, z1), (x1 + t, y1 + t, z1 + t)),
-        ("Back", (x0 - t, y1, z0), (x1 + t, y1 + t, z1)), ("Front", (x0 - t, y0 - t, z0), (x1 + t, y0, z1)),
-        ("Left", (x0 - t, y0, z0), (x0, y1, z1)), ("Right", (x1, y0, z0), (x1 + t, y1, z1)))
+        ("Floor", (x0 - t, y0 - t, z0 - t), (x1 + t, y1 + t, z0)),
+        ("Ceiling", (x0 - t, y0 - t, z1), (x1 + t, y1 + t, z1 + t)),
+        ("Back", (x0 - t, y1, z0), (x1 + t, y1 + t, z1)),
+        ("Front", (x0 - t, y0 - t, z0), (x1 + t, y0, z1)),
+        ("Left", (x0 - t, y0, z0), (x0, y1, z1)),
+        ("Right", (x1, y0, z0), (x1 + t, y1, z1)),
+    )
     for (name, box_low, box_high), material in zip(boxes, materials):
         add_box(scene, name, box_low, box_high, material)

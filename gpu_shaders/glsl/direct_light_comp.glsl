@@ -1,7 +1,8 @@
 /* What a texel sends to its probe before any bounce: reflected direct light, and emission as far as the field carries it.
  *
- * Each of `samples` looks at another place of the texel's footprint, found on the plane of its surface without another ray, and at another
- * place of each light: shadow edges and bright spots are averaged over the texel instead of missed or hit by its centre.
+ * Each of `samples` looks at another place of each light and, where the texel and its neighbours see one flat surface, at another place of
+ * the texel's footprint, found on that plane without another ray: shadow edges and bright spots are averaged over the texel instead of
+ * missed or hit by its centre. Over mouldings and edges the plane would lead behind the surface, so there the centre is kept.
  * Dispatch: x = columns, y = 6·FACE rows, z = probes; groups of 8×8×1. Reads layer first_layer + probe of geometry, albedo and emission,
  * writes `source`.
  */
@@ -16,6 +17,25 @@ void look_at_place(ivec2 texel, vec2 place, vec3 normal, inout vec3 direction, i
     direction = moved;
     distance = range;
   }
+}
+
+/* Do the texel's neighbours on its face lie on the plane through `point`? */
+bool lies_flat(ivec3 at, vec3 point, vec3 normal, float distance)
+{
+  for (int i = 0; i < 4; i++) {
+    ivec3 neighbour = at + ivec3(i < 2 ? 2 * i - 1 : 0, i < 2 ? 0 : 2 * i - 5, 0);
+    if (neighbour.x < 0 || neighbour.x >= FACE || neighbour.y < 0 || neighbour.y / FACE != at.y / FACE) {
+      continue;
+    }
+    vec4 seen = texelFetch(geometry, neighbour, 0);
+    if (seen.z >= NO_SURFACE || dot(octahedral_decode(seen.xy), normal) < 0.99) {
+      return false;
+    }
+    if (abs(dot(texel_direction(neighbour.xy) * abs(seen.z) - point, normal)) > 0.01 * distance) {
+      return false;
+    }
+  }
+  return true;
 }
 
 void main()
@@ -34,12 +54,14 @@ void main()
     vec3 normal = octahedral_decode(seen.xy);
     vec3 centre_direction = texel_direction(id.xy);
     uvec3 key = uvec3(uint(probe.w), uint(id.y * FACE + id.x), uint(seed));
+    bool flat_footprint = samples > 1 && lies_flat(at, centre_direction * abs(seen.z), normal, abs(seen.z));
     vec3 irradiance = vec3(0.0);
     for (int i = 0; i < samples; i++) {
-      vec2 place = samples == 1 ? vec2(0.5) : sample_r2(key + uvec3(0u, 0u, 0x632BE5ABu), i);
       vec3 direction = centre_direction;
       float range = abs(seen.z);
-      look_at_place(id.xy, place, normal, direction, range);
+      if (flat_footprint) {
+        look_at_place(id.xy, sample_r2(key + uvec3(0u, 0u, 0x632BE5ABu), i), normal, direction, range);
+      }
       vec3 point = probe.xyz + direction * range;
       vec3 origin = step_off(point, normal, -direction, range);
       irradiance += lamps_irradiance(point, origin, normal, key, i);

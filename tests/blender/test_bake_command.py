@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``gridlight bake`` and ``demo`` as a user calls them: files, summary, bad input, interrupts, machines without a driver."""
+"""``gridlight bake`` and ``demo`` as a user calls them: files, summary, bad input, interrupts, machines without a
+driver."""
 
 import hashlib
 import json
@@ -48,6 +49,7 @@ def volume(name, location):
         bpy.context.object.name = name
         bpy.context.object["gridlight_volume"] = 1
         bpy.context.object["gridlight_resolution"] = [2, 2, 2]
+
     return add
 
 
@@ -64,7 +66,11 @@ def summary_of(done):
 
 def assert_one_line(done, status, *words):
     lines = done.stderr.splitlines()
-    assert done.returncode == status and len(lines) == 1 and not done.stdout, (done.returncode, done.stdout, done.stderr)
+    assert done.returncode == status and len(lines) == 1 and not done.stdout, (
+        done.returncode,
+        done.stdout,
+        done.stderr,
+    )
     for word in words:
         assert word in lines[0]
 
@@ -83,8 +89,9 @@ def test_bake_writes_its_files_and_says_so(run_gridlight, lit_room, tmp_path):
     assert summary["settings"]["face"] == 8 and summary["settings"]["bounces"] == "auto"
     field = probe_file.read(tmp_path / "out" / "probes.exr")
     assert field.grid.resolution == (3, 3, 3)
-    assert {key: int((field.state == value).sum()) for key, value in (("active", ACTIVE), ("culled", CULLED))}.items() \
-        <= summary["probes"].items()
+    assert {
+        key: int((field.state == value).sum()) for key, value in (("active", ACTIVE), ("culled", CULLED))
+    }.items() <= summary["probes"].items()
     assert (field.coefficients[field.state == ACTIVE, 0] > 0).all()
     assert field.metadata["settings"] == summary["settings"] and field.metadata["converged"] is True
     assert (hashlib.sha256(lit_room.read_bytes()).hexdigest(), sorted(os.listdir(lit_room.parent))) == before
@@ -110,8 +117,21 @@ def test_several_volumes_give_a_file_each(run_gridlight, tmp_path):
 
 
 def test_spacing_and_fitted_volume(run_gridlight, lit_room, tmp_path):
-    done = run_gridlight("bake", lit_room, "-o", tmp_path / "a", "--min", "-1,-1,-1", "--max", "1,1,0", "--spacing", "0.5",
-                         "--face", "4", "--keep-all")
+    done = run_gridlight(
+        "bake",
+        lit_room,
+        "-o",
+        tmp_path / "a",
+        "--min",
+        "-1,-1,-1",
+        "--max",
+        "1,1,0",
+        "--spacing",
+        "0.5",
+        "--face",
+        "4",
+        "--keep-all",
+    )
     assert summary_of(done)["probes"]["total"] == 5 * 5 * 3
     done = run_gridlight("bake", lit_room, "-o", tmp_path / "b", "--spacing", "2", "--face", "4")
     assert done.returncode == 0 and summary_of(done)["probes"]["total"] >= 8
@@ -147,7 +167,8 @@ def test_light_that_never_settles_ends_with_status_4_and_files(run_gridlight, tm
     assert probe_file.read(tmp_path / "out" / "probes.exr").metadata["converged"] is False
 
 
-# --- bad input ---------------------------------------------------------------------------------------------------------
+# --- bad input
+# ---------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", ["missing", "truncated", "text", "empty file", "folder", "empty scene", "hidden"])
@@ -172,16 +193,19 @@ def test_files_that_cannot_be_baked(run_gridlight, lit_room, tmp_path, kind):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(("options", "words"), [
-    (["--min", "0,0,0", "--max", "0,1,1", "--resolution", "2,2,2"], ["no size along X"]),
-    (["--min", "0,0,0", "--max", "1,-1,1", "--resolution", "2,2,2"], ["no size along Y"]),
-    (["--min", "0,0,0", "--max", "1,1,1", "--resolution", "0,2,2"], ["0,2,2", "1 to 256"]),
-    (["--min", "0,0,0", "--max", "1,1,1", "--resolution", "1000000,2,2"], ["1000000", "1 to 256"]),
-    (["--min", "0,0,0", "--max", "1,1,1", "--spacing", "1e-12"], ["1 to 256"]),
-    (["--resolution", "0,2,2"], ["0,2,2", "1 to 256"]),
-    (["--min", "0,0,0", "--max", "1,1,1", "--resolution", "256,256,256"], ["MiB"]),
-    (["--frame", "99999999"], ["--frame"]),
-])
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--min", "0,0,0", "--max", "0,1,1", "--resolution", "2,2,2"], ["no size along X"]),
+        (["--min", "0,0,0", "--max", "1,-1,1", "--resolution", "2,2,2"], ["no size along Y"]),
+        (["--min", "0,0,0", "--max", "1,1,1", "--resolution", "0,2,2"], ["0,2,2", "1 to 256"]),
+        (["--min", "0,0,0", "--max", "1,1,1", "--resolution", "1000000,2,2"], ["1000000", "1 to 256"]),
+        (["--min", "0,0,0", "--max", "1,1,1", "--spacing", "1e-12"], ["1 to 256"]),
+        (["--resolution", "0,2,2"], ["0,2,2", "1 to 256"]),
+        (["--min", "0,0,0", "--max", "1,1,1", "--resolution", "256,256,256"], ["MiB"]),
+        (["--frame", "99999999"], ["--frame"]),
+    ],
+)
 def test_volumes_that_make_no_sense(run_gridlight, lit_room, tmp_path, options, words):
     assert_one_line(run_gridlight("bake", lit_room, "-o", tmp_path / "out", *options), 2, *words)
     assert not (tmp_path / "out").exists()
@@ -204,34 +228,62 @@ def test_folders_that_cannot_be_written(run_gridlight, lit_room, tmp_path, targe
 
 def test_a_full_disk_leaves_nothing(lit_room, tmp_path, root):
     """A limit on the size of files stands for the disk: writing beyond it fails the same way."""
-    program = ("import resource, runpy, signal, sys\n"
-               "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-               "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"
-               f"sys.argv = ['gridlight', *sys.argv[1:]]; runpy.run_path({str(root / 'cli' / '__main__.py')!r}, "
-               "run_name='__main__')\n")
-    done = subprocess.run([sys.executable, "-I", "-c", program, "bake", lit_room, "-o", tmp_path / "out", *BOX, "--quiet"],
-                          capture_output=True, text=True, check=False, timeout=300)
+    program = (
+        "import resource, runpy, signal, sys\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"
+        f"sys.argv = ['gridlight', *sys.argv[1:]]; runpy.run_path({str(root / 'cli' / '__main__.py')!r}, "
+        "run_name='__main__')\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-I", "-c", program, "bake", lit_room, "-o", tmp_path / "out", *BOX, "--quiet"],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
     assert_one_line(done, 2, "cannot write")
     assert not list(tmp_path.iterdir())
 
 
-# --- interrupts --------------------------------------------------------------------------------------------------------
+# --- interrupts
+# --------------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
 def long_bake(tmp_path_factory):
     """Command line of a bake that takes minutes, without its output folder."""
     blend = save(tmp_path_factory.mktemp("scenes") / "long.blend", room, lamp)
-    return ["bake", blend, "--min", "-1,-1,-1", "--max", "1,1,1", "--resolution", "40,40,40", "--keep-all", "--face", "32",
-            "--tolerance", "1e-6", "--memory", "64"]
+    return [
+        "bake",
+        blend,
+        "--min",
+        "-1,-1,-1",
+        "--max",
+        "1,1,1",
+        "--resolution",
+        "40,40,40",
+        "--keep-all",
+        "--face",
+        "32",
+        "--tolerance",
+        "1e-6",
+        "--memory",
+        "64",
+    ]
 
 
 @pytest.mark.parametrize("delay", [0.25, 0.6, 1.5, 4.0])
 @pytest.mark.parametrize("whole_group", [False, True], ids=["parent", "group"])
 def test_one_interrupt_ends_it_cleanly(long_bake, root, tmp_path, delay, whole_group):
     """As a terminal delivers Ctrl-C (to the whole process group) and as ``kill -INT`` does (to the parent)."""
-    process = subprocess.Popen([sys.executable, "-I", root / "cli" / "__main__.py", *long_bake, "-o", tmp_path / "out"],
-                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    process = subprocess.Popen(
+        [sys.executable, "-I", root / "cli" / "__main__.py", *long_bake, "-o", tmp_path / "out"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
     time.sleep(delay)
     (os.killpg if whole_group else os.kill)(process.pid, signal.SIGINT)
     started = time.monotonic()
@@ -243,8 +295,11 @@ def test_one_interrupt_ends_it_cleanly(long_bake, root, tmp_path, delay, whole_g
 
 
 def test_the_child_ends_when_the_parent_is_killed(long_bake, root, tmp_path):
-    process = subprocess.Popen([sys.executable, "-I", root / "cli" / "__main__.py", *long_bake, "-o", tmp_path / "out"],
-                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        [sys.executable, "-I", root / "cli" / "__main__.py", *long_bake, "-o", tmp_path / "out"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     time.sleep(2)
     children = open(f"/proc/{process.pid}/task/{process.pid}/children").read().split()
     assert len(children) == 1
@@ -259,18 +314,23 @@ def test_the_child_ends_when_the_parent_is_killed(long_bake, root, tmp_path):
         pytest.fail("the child went on without its parent")
 
 
-# --- machines without a driver -----------------------------------------------------------------------------------------
+# --- machines without a driver
+# -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("missing", [{"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent"}, {"LIBGL_DRIVERS_PATH": "/nonexistent"}],
-                         ids=["no EGL vendor", "no Mesa driver"])
+@pytest.mark.parametrize(
+    "missing",
+    [{"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent"}, {"LIBGL_DRIVERS_PATH": "/nonexistent"}],
+    ids=["no EGL vendor", "no Mesa driver"],
+)
 def test_no_gpu_context_is_status_3_and_one_line(run_gridlight, lit_room, tmp_path, missing):
     done = run_gridlight("bake", lit_room, "-o", tmp_path / "out", *BOX, "--quiet", env={**os.environ, **missing})
     assert_one_line(done, 3, "no usable GPU context", "install")
     assert not (tmp_path / "out").exists()
 
 
-# --- the .blend is data ------------------------------------------------------------------------------------------------
+# --- the .blend is data
+# ------------------------------------------------------------------------------------------------
 
 
 def test_nothing_inside_the_file_is_run(run_gridlight, tmp_path):
@@ -299,7 +359,8 @@ def test_names_from_the_file_are_escaped_in_the_report(run_gridlight, tmp_path):
     assert "<script>alert" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
-# --- demo --------------------------------------------------------------------------------------------------------------
+# --- demo
+# --------------------------------------------------------------------------------------------------------------
 
 
 def test_demo(run_gridlight, tmp_path):
@@ -308,8 +369,13 @@ def test_demo(run_gridlight, tmp_path):
     assert len(done.stdout.splitlines()) == 1
     summary = summary_of(done)
     assert summary["probes"] == {"total": 308, "active": 295, "culled": 13, "invalid": 0} and summary["converged"]
-    assert sorted(os.listdir(tmp_path / "demo")) == ["gallery.blend", "preview.png", "preview_probes.png", "probes.exr",
-                                                     "report.html"]
+    assert sorted(os.listdir(tmp_path / "demo")) == [
+        "gallery.blend",
+        "preview.png",
+        "preview_probes.png",
+        "probes.exr",
+        "report.html",
+    ]
     field = probe_file.read(tmp_path / "demo" / "probes.exr")
     assert np.isfinite(field.coefficients).all() and (field.coefficients[:, 0] >= 0).all()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "demo" / "gallery.blend"), use_scripts=False)

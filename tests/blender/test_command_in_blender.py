@@ -24,8 +24,17 @@ def test_info(capfd, tmp_path):
     assert status == 0 and json.loads(output.splitlines()[-1])["probes"]["total"] == 8
 
 
-@pytest.mark.parametrize(("words", "status"), [([], 2), (["nonsense"], 2), (["--help"], 0), (["bake", "--help"], 0),
-                                               (["info", "none.exr"], 2), (["bake", "none.blend", "-o", "out"], 2)])
+@pytest.mark.parametrize(
+    ("words", "status"),
+    [
+        ([], 2),
+        (["nonsense"], 2),
+        (["--help"], 0),
+        (["bake", "--help"], 0),
+        (["info", "none.exr"], 2),
+        (["bake", "none.blend", "-o", "out"], 2),
+    ],
+)
 def test_endings_that_must_not_end_blender(capfd, words, status):
     assert execute(capfd, *words)[0] == status
 
@@ -36,9 +45,28 @@ def test_bake_of_the_open_file(capfd, tmp_path, gpu_context):
     bpy.ops.mesh.primitive_cube_add(size=4)
     bpy.ops.object.light_add(type="POINT", location=(0.3, 0.2, 0.5))
     objects = sorted(bpy.data.objects.keys())
-    status, output, errors = execute(capfd, "bake", "-o", tmp_path, "--min", "-1,-1,-1", "--max", "1,1,1", "--resolution",
-                                     "2,2,2", "--face", 4, "--keep-all", "--quiet")
+    status, output, errors = execute(
+        capfd,
+        "bake",
+        "-o",
+        tmp_path,
+        "--min",
+        "-1,-1,-1",
+        "--max",
+        "1,1,1",
+        "--resolution",
+        "2,2,2",
+        "--face",
+        4,
+        "--keep-all",
+        "--quiet",
+    )
     assert status == 0, errors
     assert json.loads(output.splitlines()[-1])["probes"]["active"] == 8
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["preview.png", "preview_probes.png", "probes.exr", "report.html"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "preview.png",
+        "preview_probes.png",
+        "probes.exr",
+        "report.html",
+    ]
     assert sorted(bpy.data.objects.keys()) == objects and not bpy.data.filepath

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Many bounces against Cycles: a Cornell-like room, irradiance for six normals at nodes in free space, default settings."""
+"""Many bounces against Cycles: a Cornell-like room, irradiance for six normals at nodes in free space, default
+settings."""
 
 import bpy
 import numpy as np

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every kind of light against Cycles: what one probe sees of a wall that only this light shines on.
 
-One bounce on both sides: the probe's texels hold emission plus reflected direct light, Cycles stops at the first hit. The lights stand
-behind the probe and a small screen before them casts a shadow on the wall, so the size and shape of a light matter and not only its
-power. The wall fills the view and the probe sees only the dark side of the screen: no silhouette of anything lit is in sight, whose
-aliasing would be an error of texels and not of lights. The comparison is of all coefficients of four bands, and of the mean
-radiance (band 0) alone.
+One bounce on both sides: the probe's texels hold emission plus reflected direct light, Cycles stops at the first hit.
+The lights stand behind the probe and a small screen before them casts a shadow on the wall, so the size and shape of a
+light matter and not only its power. The wall fills the view and the probe sees only the dark side of the screen: no
+silhouette of anything lit is in sight, whose aliasing would be an error of texels and not of lights. The comparison is
+of all coefficients of four bands, and of the mean radiance (band 0) alone.
 """
 
 import bpy
@@ -35,35 +35,99 @@ LIGHTS = {
     "point, soft": dict(kind="POINT", location=BEHIND, energy=50, shadow_soft_size=0.3, use_soft_falloff=True),
     "point, sphere": dict(kind="POINT", location=BEHIND, energy=50, shadow_soft_size=0.3, use_soft_falloff=False),
     "point, not normalized": dict(kind="POINT", location=BEHIND, energy=50, shadow_soft_size=0.3, normalize=False),
-    "point, sharp, not normalized": dict(kind="POINT", location=BEHIND, energy=50, shadow_soft_size=0.0, normalize=False),
+    "point, sharp, not normalized": dict(
+        kind="POINT", location=BEHIND, energy=50, shadow_soft_size=0.0, normalize=False
+    ),
     "point, scaled": dict(kind="POINT", location=BEHIND, energy=50, shadow_soft_size=0.2, scale=(2.0, 2.0, 2.0)),
     "point, no shadow": dict(kind="POINT", location=BEHIND, energy=50, shadow_soft_size=0.0, use_shadow=False),
-    "spot": dict(kind="SPOT", location=BEHIND, rotation=SLANTED, energy=50, shadow_soft_size=0.0, spot_size=1.2, spot_blend=0.0,
-                 use_shadow=False),
-    "spot, blend": dict(kind="SPOT", location=BEHIND, rotation=SLANTED, energy=50, shadow_soft_size=0.0, spot_size=1.4, spot_blend=0.6,
-                        use_shadow=False),
-    "spot, soft": dict(kind="SPOT", location=BEHIND, rotation=SLANTED, energy=50, shadow_soft_size=0.2, spot_size=1.2, spot_blend=0.3),
-    "spot, sphere": dict(kind="SPOT", location=BEHIND, rotation=SLANTED, energy=50, shadow_soft_size=0.2, spot_size=1.2, spot_blend=0.3,
-                         use_soft_falloff=False),
-    "spot, scaled": dict(kind="SPOT", location=BEHIND, rotation=SLANTED, energy=50, shadow_soft_size=0.0, spot_size=1.0, spot_blend=0.5,
-                         scale=(1.0, 2.0, 0.7)),
+    "spot": dict(
+        kind="SPOT",
+        location=BEHIND,
+        rotation=SLANTED,
+        energy=50,
+        shadow_soft_size=0.0,
+        spot_size=1.2,
+        spot_blend=0.0,
+        use_shadow=False,
+    ),
+    "spot, blend": dict(
+        kind="SPOT",
+        location=BEHIND,
+        rotation=SLANTED,
+        energy=50,
+        shadow_soft_size=0.0,
+        spot_size=1.4,
+        spot_blend=0.6,
+        use_shadow=False,
+    ),
+    "spot, soft": dict(
+        kind="SPOT", location=BEHIND, rotation=SLANTED, energy=50, shadow_soft_size=0.2, spot_size=1.2, spot_blend=0.3
+    ),
+    "spot, sphere": dict(
+        kind="SPOT",
+        location=BEHIND,
+        rotation=SLANTED,
+        energy=50,
+        shadow_soft_size=0.2,
+        spot_size=1.2,
+        spot_blend=0.3,
+        use_soft_falloff=False,
+    ),
+    "spot, scaled": dict(
+        kind="SPOT",
+        location=BEHIND,
+        rotation=SLANTED,
+        energy=50,
+        shadow_soft_size=0.0,
+        spot_size=1.0,
+        spot_blend=0.5,
+        scale=(1.0, 2.0, 0.7),
+    ),
     "sun": dict(kind="SUN", rotation=SLANTED, energy=3.0, angle=0.0),
     "sun, angle": dict(kind="SUN", rotation=SLANTED, energy=3.0, angle=0.3),
     "sun, wide": dict(kind="SUN", rotation=SLANTED, energy=3.0, angle=2.0),
     "sun, not normalized": dict(kind="SUN", rotation=SLANTED, energy=3.0, angle=0.5, normalize=False),
     "area, square": dict(kind="AREA", location=BEHIND, rotation=SLANTED, energy=50, shape="SQUARE", size=0.5),
-    "area, rectangle": dict(kind="AREA", location=BEHIND, rotation=SLANTED, energy=50, shape="RECTANGLE", size=0.8, size_y=0.2),
+    "area, rectangle": dict(
+        kind="AREA", location=BEHIND, rotation=SLANTED, energy=50, shape="RECTANGLE", size=0.8, size_y=0.2
+    ),
     "area, disk": dict(kind="AREA", location=BEHIND, rotation=SLANTED, energy=50, shape="DISK", size=0.5),
-    "area, ellipse": dict(kind="AREA", location=BEHIND, rotation=SLANTED, energy=50, shape="ELLIPSE", size=0.8, size_y=0.3),
-    "area, scaled": dict(kind="AREA", location=BEHIND, rotation=SLANTED, energy=50, shape="RECTANGLE", size=0.4, size_y=0.2,
-                         scale=(1.5, 2.5, 1.0)),
-    "area, spread": dict(kind="AREA", location=BEHIND, rotation=SLANTED, energy=50, shape="SQUARE", size=0.5, spread=1.2),
-    "area, narrow spread": dict(kind="AREA", location=BEHIND, rotation=SLANTED, energy=50, shape="DISK", size=0.4, spread=0.3),
-    "area, not normalized": dict(kind="AREA", location=BEHIND, rotation=SLANTED, energy=50, shape="SQUARE", size=0.5, normalize=False),
-    "area, near the probe": dict(kind="AREA", location=(0.4, 0.2, 0.9), rotation=FACING_WALL, energy=20, shape="SQUARE", size=0.6),
+    "area, ellipse": dict(
+        kind="AREA", location=BEHIND, rotation=SLANTED, energy=50, shape="ELLIPSE", size=0.8, size_y=0.3
+    ),
+    "area, scaled": dict(
+        kind="AREA",
+        location=BEHIND,
+        rotation=SLANTED,
+        energy=50,
+        shape="RECTANGLE",
+        size=0.4,
+        size_y=0.2,
+        scale=(1.5, 2.5, 1.0),
+    ),
+    "area, spread": dict(
+        kind="AREA", location=BEHIND, rotation=SLANTED, energy=50, shape="SQUARE", size=0.5, spread=1.2
+    ),
+    "area, narrow spread": dict(
+        kind="AREA", location=BEHIND, rotation=SLANTED, energy=50, shape="DISK", size=0.4, spread=0.3
+    ),
+    "area, not normalized": dict(
+        kind="AREA", location=BEHIND, rotation=SLANTED, energy=50, shape="SQUARE", size=0.5, normalize=False
+    ),
+    "area, near the probe": dict(
+        kind="AREA", location=(0.4, 0.2, 0.9), rotation=FACING_WALL, energy=20, shape="SQUARE", size=0.6
+    ),
     "exposure": dict(kind="POINT", location=BEHIND, energy=50, shadow_soft_size=0.0, exposure=1.5),
-    "temperature": dict(kind="AREA", location=BEHIND, rotation=SLANTED, energy=50, shape="SQUARE", size=0.5, use_temperature=True,
-                        temperature=3200.0),
+    "temperature": dict(
+        kind="AREA",
+        location=BEHIND,
+        rotation=SLANTED,
+        energy=50,
+        shape="SQUARE",
+        size=0.5,
+        use_temperature=True,
+        temperature=3200.0,
+    ),
 }
 
 
@@ -83,7 +147,9 @@ def probe_and_reference(scene, samples):
 
     grid = Grid.from_bounds(PROBE - 0.5, PROBE + 0.5, (1, 1, 1))
     result = run_bake(read_scene(scene), grid, SETTINGS, Reporter(quiet=True), lambda: False)
-    references = [project_panorama(render_panoramas(scene, PROBE, 256, 128, samples, seed, bounces=0)[0], 4) for seed in (1, 2)]
+    references = [
+        project_panorama(render_panoramas(scene, PROBE, 256, 128, samples, seed, bounces=0)[0], 4) for seed in (1, 2)
+    ]
     return result.field.coefficients[0], references
 
 
@@ -93,7 +159,9 @@ def check(scene, samples=16):
     noise = measures.noise_of_mean(references[0][None], references[1][None])
     error = measures.compare(baked[None], reference[None]).relative_rms
     mean = np.linalg.norm(baked[0] - reference[0]) / np.linalg.norm(reference[0])
-    print(f"all coefficients {100 * error:.3f} %, band 0 {100 * mean:.3f} %, noise of the reference {100 * noise:.3f} %")
+    print(
+        f"all coefficients {100 * error:.3f} %, band 0 {100 * mean:.3f} %, noise of the reference {100 * noise:.3f} %"
+    )
     assert noise < NOISE
     assert mean < TOLERANCE
     assert error < TOLERANCE

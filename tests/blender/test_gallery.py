@@ -2,6 +2,7 @@
 """The demo gallery: what it must contain, that its walls are solid, and that culling leaves 295 of its 308 probes."""
 
 import bpy  # first, because the wheel brings bmesh with it
+
 import bmesh  # isort: skip
 import numpy as np
 import pytest

@@ -11,16 +11,31 @@ import gridlight
 
 def traces() -> dict:
     """Everything that an extension could leave in Blender, by place, as comparable sets."""
-    handlers = {name: list(map(repr, getattr(bpy.app.handlers, name)))
-                for name in dir(bpy.app.handlers) if isinstance(getattr(bpy.app.handlers, name), list)}
+    handlers = {
+        name: list(map(repr, getattr(bpy.app.handlers, name)))
+        for name in dir(bpy.app.handlers)
+        if isinstance(getattr(bpy.app.handlers, name), list)
+    }
     operators = {f"{module}.{name}" for module in dir(bpy.ops) for name in dir(getattr(bpy.ops, module))}
-    properties = {(kind, name) for kind in ("Scene", "Object", "Light", "Material", "WindowManager", "Collection", "World")
-                  for name in getattr(bpy.types, kind).bl_rna.properties.keys()}
-    subclasses = {base: {cls.__name__ for cls in getattr(bpy.types, base).__subclasses__() if cls.is_registered}
-                  for base in ("Operator", "Panel", "PropertyGroup", "Menu", "RenderEngine", "AddonPreferences", "UIList")}
-    return {"types": set(dir(bpy.types)), "operators": operators, "properties": properties, "handlers": handlers,
-            "classes": subclasses, "keymaps": len(bpy.context.window_manager.keyconfigs.addon.keymaps)
-            if bpy.context.window_manager.keyconfigs.addon else 0}
+    properties = {
+        (kind, name)
+        for kind in ("Scene", "Object", "Light", "Material", "WindowManager", "Collection", "World")
+        for name in getattr(bpy.types, kind).bl_rna.properties.keys()
+    }
+    subclasses = {
+        base: {cls.__name__ for cls in getattr(bpy.types, base).__subclasses__() if cls.is_registered}
+        for base in ("Operator", "Panel", "PropertyGroup", "Menu", "RenderEngine", "AddonPreferences", "UIList")
+    }
+    return {
+        "types": set(dir(bpy.types)),
+        "operators": operators,
+        "properties": properties,
+        "handlers": handlers,
+        "classes": subclasses,
+        "keymaps": len(bpy.context.window_manager.keyconfigs.addon.keymaps)
+        if bpy.context.window_manager.keyconfigs.addon
+        else 0,
+    }
 
 
 def command_is_registered(capfd) -> bool:
@@ -60,10 +75,16 @@ def test_no_gpu_context_is_made_by_registering():
         "start = importlib.util.module_from_spec(spec); spec.loader.exec_module(start)\n"
         "import bpy\n"
         "start.load_package().register()\n"
-        "print('registered', flush=True); os._exit(0)\n")
+        "print('registered', flush=True); os._exit(0)\n"
+    )
     # No EGL vendor at all: any GPU call would end this process.
-    environment = {"PATH": "/usr/bin:/bin", "HOME": "/tmp", "__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent",
-                   "LIBGL_DRIVERS_PATH": "/nonexistent"}
-    done = subprocess.run([sys.executable, "-I", "-c", program], env=environment, capture_output=True, text=True,
-                          timeout=120, check=False)
+    environment = {
+        "PATH": "/usr/bin:/bin",
+        "HOME": "/tmp",
+        "__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent",
+        "LIBGL_DRIVERS_PATH": "/nonexistent",
+    }
+    done = subprocess.run(
+        [sys.executable, "-I", "-c", program], env=environment, capture_output=True, text=True, timeout=120, check=False
+    )
     assert done.returncode == 0 and "registered" in done.stdout, done.stderr

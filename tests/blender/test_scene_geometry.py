@@ -7,10 +7,9 @@ import time
 import bpy
 import numpy as np
 import pytest
+from gridlight.scene.read import read_scene
 from mathutils import Matrix
 from scene_builders import empty_scene, image, material, mesh, node, place, quad, with_nodes
-
-from gridlight.scene.read import read_scene
 
 TRIANGLE = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
 
@@ -159,9 +158,16 @@ def test_geometry_nodes_instances_and_materials(scene):
     tree = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     nodes = tree.nodes
-    grid, cube, scatter, paint, exit_node = (nodes.new(kind) for kind in (
-        "GeometryNodeMeshGrid", "GeometryNodeMeshCube", "GeometryNodeInstanceOnPoints", "GeometryNodeSetMaterial",
-        "NodeGroupOutput"))
+    grid, cube, scatter, paint, exit_node = (
+        nodes.new(kind)
+        for kind in (
+            "GeometryNodeMeshGrid",
+            "GeometryNodeMeshCube",
+            "GeometryNodeInstanceOnPoints",
+            "GeometryNodeSetMaterial",
+            "NodeGroupOutput",
+        )
+    )
     grid.inputs["Vertices X"].default_value = grid.inputs["Vertices Y"].default_value = 3
     paint.inputs["Material"].default_value = material("red", inputs={"Color": (1, 0, 0, 1)})
     for source, target in (
@@ -210,8 +216,16 @@ def test_uv_maps_with_mapping_and_mirroring(scene):
     made = bpy.data.materials.new("textured")
     tree = with_nodes(made)
     coordinates = node(tree, "ShaderNodeTexCoord")
-    mapping = node(tree, "ShaderNodeMapping", {"Vector": coordinates.outputs["UV"], "Location": (0.5, 0, 0),
-                                               "Rotation": (0, 0, math.pi / 2), "Scale": (2, 3, 1)})
+    mapping = node(
+        tree,
+        "ShaderNodeMapping",
+        {
+            "Vector": coordinates.outputs["UV"],
+            "Location": (0.5, 0, 0),
+            "Rotation": (0, 0, math.pi / 2),
+            "Scale": (2, 3, 1),
+        },
+    )
     texture = node(tree, "ShaderNodeTexImage", {"Vector": mapping.outputs[0]}, image=image("i", np.ones((4, 4, 4))))
     shader = node(tree, "ShaderNodeBsdfDiffuse", {"Color": texture.outputs["Color"]})
     node(tree, "ShaderNodeOutputMaterial", {"Surface": shader.outputs[0]})
@@ -252,6 +266,7 @@ def test_ray_visibility(scene):
 
 def test_one_mesh_read_once_for_a_thousand_instances(scene, monkeypatch):
     from gridlight.scene import read
+
     calls = []
     monkeypatch.setattr(read, "read_mesh", lambda data, original=read.read_mesh: calls.append(1) or original(data))
     data = mesh("tri", TRIANGLE, [(0, 1, 2)])

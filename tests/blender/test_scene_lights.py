@@ -6,10 +6,9 @@ import math
 import bpy
 import numpy as np
 import pytest
-from scene_builders import empty_scene, material, node, place, quad, with_nodes
-
 from gridlight.scene.cycles_reference import render_panoramas
 from gridlight.scene.read import read_scene
+from scene_builders import empty_scene, material, node, place, quad, with_nodes
 
 HEIGHT = 2.0  # metres from the light to the lit point
 
@@ -48,36 +47,43 @@ def closed_form(light):
             return color * math.pi * radius**2 / (radius**2 + HEIGHT**2)
         grid = (np.arange(200) + 0.5) / 200 - 0.5
         x, y = np.meshgrid(grid * light.size_x, grid * light.size_y)
-        inside = np.ones_like(x) if light.shape == "RECTANGLE" else (
-            (2 * x / light.size_x) ** 2 + (2 * y / light.size_y) ** 2 <= 1)
+        inside = (
+            np.ones_like(x)
+            if light.shape == "RECTANGLE"
+            else ((2 * x / light.size_x) ** 2 + (2 * y / light.size_y) ** 2 <= 1)
+        )
         cell = light.size_x * light.size_y / 200**2
         return color * cell * (inside * HEIGHT**2 / (x * x + y * y + HEIGHT**2) ** 2).sum()
     falloff = HEIGHT**2 + (light.radius**2 if light.soft_falloff else 0.0)
     return color / falloff
 
 
-@pytest.mark.parametrize(("kind", "properties"), [
-    ("POINT", {"shadow_soft_size": 0.0}),
-    ("POINT", {"shadow_soft_size": 0.5, "exposure": 1.5, "color": (1, 0.5, 0.25)}),
-    ("POINT", {"shadow_soft_size": 0.5, "scale": (3, 3, 3)}),
-    ("POINT", {"shadow_soft_size": 0.5, "use_soft_falloff": False}),
-    ("POINT", {"shadow_soft_size": 0.5, "normalize": False}),
-    ("POINT", {"shadow_soft_size": 0.0, "normalize": False}),
-    ("POINT", {"shadow_soft_size": 0.0, "use_temperature": True, "temperature": 2700.0}),
-    ("SPOT", {"shadow_soft_size": 0.2, "spot_size": 1.0, "spot_blend": 0.2}),
-    ("SUN", {"angle": 0.0}),
-    ("SUN", {"angle": 0.3}),
-    ("SUN", {"angle": 0.5, "normalize": False}),
-    ("AREA", {"shape": "SQUARE", "size": 0.8}),
-    ("AREA", {"shape": "RECTANGLE", "size": 0.8, "size_y": 0.3}),
-    ("AREA", {"shape": "DISK", "size": 0.8}),
-    ("AREA", {"shape": "ELLIPSE", "size": 0.8, "size_y": 0.3, "scale": (2, 1, 1)}),
-    ("AREA", {"shape": "SQUARE", "size": 0.5, "scale": (2, 3, 1)}),
-    ("AREA", {"shape": "SQUARE", "size": 0.5, "scale": (2, 3, 1), "normalize": False}),
-], ids=lambda value: "-".join(f"{key}={item}" for key, item in value.items()) if isinstance(value, dict) else value)
+@pytest.mark.parametrize(
+    ("kind", "properties"),
+    [
+        ("POINT", {"shadow_soft_size": 0.0}),
+        ("POINT", {"shadow_soft_size": 0.5, "exposure": 1.5, "color": (1, 0.5, 0.25)}),
+        ("POINT", {"shadow_soft_size": 0.5, "scale": (3, 3, 3)}),
+        ("POINT", {"shadow_soft_size": 0.5, "use_soft_falloff": False}),
+        ("POINT", {"shadow_soft_size": 0.5, "normalize": False}),
+        ("POINT", {"shadow_soft_size": 0.0, "normalize": False}),
+        ("POINT", {"shadow_soft_size": 0.0, "use_temperature": True, "temperature": 2700.0}),
+        ("SPOT", {"shadow_soft_size": 0.2, "spot_size": 1.0, "spot_blend": 0.2}),
+        ("SUN", {"angle": 0.0}),
+        ("SUN", {"angle": 0.3}),
+        ("SUN", {"angle": 0.5, "normalize": False}),
+        ("AREA", {"shape": "SQUARE", "size": 0.8}),
+        ("AREA", {"shape": "RECTANGLE", "size": 0.8, "size_y": 0.3}),
+        ("AREA", {"shape": "DISK", "size": 0.8}),
+        ("AREA", {"shape": "ELLIPSE", "size": 0.8, "size_y": 0.3, "scale": (2, 1, 1)}),
+        ("AREA", {"shape": "SQUARE", "size": 0.5, "scale": (2, 3, 1)}),
+        ("AREA", {"shape": "SQUARE", "size": 0.5, "scale": (2, 3, 1), "normalize": False}),
+    ],
+    ids=lambda value: "-".join(f"{key}={item}" for key, item in value.items()) if isinstance(value, dict) else value,
+)
 def test_units(scene, kind, properties):
     lamp(kind, **properties)
-    light, = read_scene(scene).lights
+    (light,) = read_scene(scene).lights
     assert closed_form(light) == pytest.approx(cycles_irradiance(scene), rel=0.01)
 
 
@@ -87,14 +93,14 @@ def test_nodes_multiply(scene):
     body = node(tree, "ShaderNodeBlackbody", {"Temperature": 4000.0})
     shader = node(tree, "ShaderNodeEmission", {"Color": body.outputs[0], "Strength": 3.0})
     node(tree, "ShaderNodeOutputLight", {"Surface": shader.outputs[0]})
-    light, = read_scene(scene).lights
+    (light,) = read_scene(scene).lights
     assert closed_form(light) == pytest.approx(cycles_irradiance(scene), rel=0.01)
 
 
 def test_frames_are_orthonormal_and_shine_the_right_way(scene):
     item = lamp("AREA", scale=(2, 3, 0.5))
     item.rotation_euler = (0.5, 0.4, 0.3)
-    light, = read_scene(scene).lights
+    (light,) = read_scene(scene).lights
     axes = light.matrix[:3, :3]
     assert np.allclose(axes.T @ axes, np.eye(3), atol=1e-6)
     assert np.allclose(axes[:, 2], np.array(item.matrix_world.to_3x3().normalized().col[2]), atol=1e-6)

@@ -4,10 +4,9 @@
 import bpy
 import numpy as np
 import pytest
-from scene_builders import empty_scene, image, material, node, place, quad, with_nodes
-
 from gridlight.core.snapshot import NO_IMAGE
 from gridlight.scene.read import read_scene
+from scene_builders import empty_scene, image, material, node, place, quad, with_nodes
 
 HALF = np.full((8, 8, 4), 1.0, np.float32)
 HALF[..., :3] = [0.2, 0.4, 0.6]
@@ -45,10 +44,15 @@ def warned(snapshot, *words):
     return any(all(word in line for word in words) for line in snapshot.warnings)
 
 
-@pytest.mark.parametrize(("kind", "color"), [
-    ("ShaderNodeBsdfDiffuse", "Color"), ("ShaderNodeBsdfPrincipled", "Base Color"),
-    ("ShaderNodeSubsurfaceScattering", "Color"), ("ShaderNodeBsdfToon", "Color"),
-])
+@pytest.mark.parametrize(
+    ("kind", "color"),
+    [
+        ("ShaderNodeBsdfDiffuse", "Color"),
+        ("ShaderNodeBsdfPrincipled", "Base Color"),
+        ("ShaderNodeSubsurfaceScattering", "Color"),
+        ("ShaderNodeBsdfToon", "Color"),
+    ],
+)
 def test_diffuse_colours(scene, kind, color):
     read_material, snapshot = read(scene, material("m", kind, {color: (0.1, 0.2, 0.3, 1)}))
     assert read_material.base_color == pytest.approx((0.1, 0.2, 0.3))
@@ -65,8 +69,14 @@ def test_material_without_nodes(scene):
 
 
 def test_metal_and_transmission_take_their_share(scene):
-    read_material, snapshot = read(scene, material("Steel", "ShaderNodeBsdfPrincipled", {
-        "Base Color": (1, 0.5, 0.5, 1), "Metallic": 0.75, "Transmission Weight": 0.2}))
+    read_material, snapshot = read(
+        scene,
+        material(
+            "Steel",
+            "ShaderNodeBsdfPrincipled",
+            {"Base Color": (1, 0.5, 0.5, 1), "Metallic": 0.75, "Transmission Weight": 0.2},
+        ),
+    )
     assert read_material.base_color == pytest.approx((0.2, 0.1, 0.1))
     assert warned(snapshot, "metallic", "'Steel'")
 
@@ -77,8 +87,9 @@ def test_emission_is_colour_times_strength(scene):
 
 
 def test_principled_emission(scene):
-    read_material, _ = read(scene, material("p", "ShaderNodeBsdfPrincipled",
-                                            {"Emission Color": (1, 0, 0.5, 1), "Emission Strength": 3.0}))
+    read_material, _ = read(
+        scene, material("p", "ShaderNodeBsdfPrincipled", {"Emission Color": (1, 0, 0.5, 1), "Emission Strength": 3.0})
+    )
     assert read_material.emission == pytest.approx((3, 0, 1.5))
     assert read_material.base_color == pytest.approx((0.8, 0.8, 0.8))
 
@@ -95,6 +106,7 @@ def test_image_texture_is_shared_between_tints(scene):
                 blend_type="MULTIPLY",
             )
             return node(tree, "ShaderNodeBsdfDiffuse", {"Color": mixed.outputs[2]}).outputs[0]
+
         return built(shader)
 
     picture = image("shared", OPAQUE)
@@ -126,8 +138,9 @@ def test_leaves_are_clipped_by_their_alpha(scene, way):
             ]
         leaf = node(tree, "ShaderNodeBsdfDiffuse", {"Color": shown.outputs["Color"]})
         hole = node(tree, "ShaderNodeBsdfTransparent")
-        return node(tree, "ShaderNodeMixShader", {"Fac": alpha, "Shader": hole.outputs[0],
-                                                  "Shader_001": leaf.outputs[0]}).outputs[0]
+        return node(
+            tree, "ShaderNodeMixShader", {"Fac": alpha, "Shader": hole.outputs[0], "Shader_001": leaf.outputs[0]}
+        ).outputs[0]
 
     read_material, snapshot = read(scene, built(shader))
     assert read_material.alpha_threshold == 0.5
@@ -138,8 +151,9 @@ def test_leaves_are_clipped_by_their_alpha(scene, way):
 
 
 def test_colour_is_premultiplied_where_alpha_is_not_used(scene):
-    read_material, snapshot = read(scene, built(
-        lambda tree: node(tree, "ShaderNodeBsdfDiffuse", {"Color": textured(tree)}).outputs[0]))
+    read_material, snapshot = read(
+        scene, built(lambda tree: node(tree, "ShaderNodeBsdfDiffuse", {"Color": textured(tree)}).outputs[0])
+    )
     pixels = snapshot.images[read_material.base_image].pixels
     assert np.allclose(pixels[:, :4, :3], 0) and np.allclose(pixels[:, 4:, :3], [0.2, 0.4, 0.6])
     assert read_material.alpha_image == NO_IMAGE
@@ -153,8 +167,14 @@ def test_constant_transparency(scene):
     assert len(snapshot.triangles) == 0 and warned(snapshot, "invisible", "'Air'")
 
 
-@pytest.mark.parametrize(("kind", "inputs"), [("ShaderNodeBsdfGlass", {}), ("ShaderNodeBsdfRefraction", {}),
-                                              ("ShaderNodeBsdfPrincipled", {"Transmission Weight": 1.0})])
+@pytest.mark.parametrize(
+    ("kind", "inputs"),
+    [
+        ("ShaderNodeBsdfGlass", {}),
+        ("ShaderNodeBsdfRefraction", {}),
+        ("ShaderNodeBsdfPrincipled", {"Transmission Weight": 1.0}),
+    ],
+)
 def test_glass_lets_light_through(scene, kind, inputs):
     _, snapshot = read(scene, material("Pane", kind, inputs))
     assert len(snapshot.triangles) == 0 and warned(snapshot, "glass", "'Pane'")
@@ -214,8 +234,9 @@ def test_missing_image_falls_back_to_the_sockets_colour(scene, tmp_path):
 def test_image_by_generated_coordinates_is_averaged(scene):
     def shader(tree):
         coordinates = node(tree, "ShaderNodeTexCoord")
-        shown = node(tree, "ShaderNodeTexImage", {"Vector": coordinates.outputs["Generated"]},
-                     image=image("bands", OPAQUE))
+        shown = node(
+            tree, "ShaderNodeTexImage", {"Vector": coordinates.outputs["Generated"]}, image=image("bands", OPAQUE)
+        )
         return node(tree, "ShaderNodeBsdfDiffuse", {"Color": shown.outputs["Color"]}).outputs[0]
 
     read_material, snapshot = read(scene, built(shader))
@@ -228,8 +249,12 @@ def test_procedural_textures_enter_with_their_mean(scene):
         checker = node(tree, "ShaderNodeTexChecker", {"Color1": (1, 0, 0, 1), "Color2": (0, 1, 0, 1), "Scale": 8.0})
         ramp = node(tree, "ShaderNodeValToRGB", {"Fac": checker.outputs["Fac"]})
         ramp.color_ramp.elements[0].color = (0, 0, 1, 1)
-        mixed = node(tree, "ShaderNodeMix", {"Factor_Float": 0.5, "A_Color": checker.outputs["Color"],
-                                             "B_Color": ramp.outputs["Color"]}, data_type="RGBA")
+        mixed = node(
+            tree,
+            "ShaderNodeMix",
+            {"Factor_Float": 0.5, "A_Color": checker.outputs["Color"], "B_Color": ramp.outputs["Color"]},
+            data_type="RGBA",
+        )
         return node(tree, "ShaderNodeBsdfDiffuse", {"Color": mixed.outputs[2]}).outputs[0]
 
     read_material, snapshot = read(scene, built(shader))
@@ -241,8 +266,11 @@ def test_procedural_textures_enter_with_their_mean(scene):
 def test_a_procedural_texture_laid_out_by_uvs_keeps_its_pattern(scene):
     def shader(tree):
         coordinates = node(tree, "ShaderNodeTexCoord")
-        checker = node(tree, "ShaderNodeTexChecker", {"Vector": coordinates.outputs["UV"], "Color1": (1, 0, 0, 1),
-                                                      "Color2": (0, 0, 1, 1), "Scale": 2.0})
+        checker = node(
+            tree,
+            "ShaderNodeTexChecker",
+            {"Vector": coordinates.outputs["UV"], "Color1": (1, 0, 0, 1), "Color2": (0, 0, 1, 1), "Scale": 2.0},
+        )
         return node(tree, "ShaderNodeBsdfDiffuse", {"Color": checker.outputs["Color"]}).outputs[0]
 
     read_material, snapshot = read(scene, built(shader))
@@ -287,8 +315,11 @@ def test_light_path_tricks_are_seen_by_diffuse_rays(scene):
         path = node(tree, "ShaderNodeLightPath")
         shown = node(tree, "ShaderNodeEmission", {"Strength": 100.0})
         real = node(tree, "ShaderNodeEmission", {"Strength": 2.0})
-        return node(tree, "ShaderNodeMixShader", {"Fac": path.outputs["Is Camera Ray"], "Shader": real.outputs[0],
-                                                  "Shader_001": shown.outputs[0]}).outputs[0]
+        return node(
+            tree,
+            "ShaderNodeMixShader",
+            {"Fac": path.outputs["Is Camera Ray"], "Shader": real.outputs[0], "Shader_001": shown.outputs[0]},
+        ).outputs[0]
 
     assert read(scene, built(shader))[0].emission == pytest.approx((2, 2, 2))
 
@@ -299,8 +330,11 @@ def test_textures_with_mappings_of_their_own_are_averaged_and_named(scene):
         coordinates = node(tree, "ShaderNodeTexCoord")
         moved = node(tree, "ShaderNodeMapping", {"Vector": coordinates.outputs["UV"], "Scale": (3, 3, 3)})
         glow = node(tree, "ShaderNodeTexImage", {"Vector": moved.outputs[0]}, image=image("glow", OPAQUE))
-        return node(tree, "ShaderNodeBsdfPrincipled", {"Base Color": base, "Emission Color": glow.outputs["Color"],
-                                                       "Emission Strength": 2.0}).outputs[0]
+        return node(
+            tree,
+            "ShaderNodeBsdfPrincipled",
+            {"Base Color": base, "Emission Color": glow.outputs["Color"], "Emission Strength": 2.0},
+        ).outputs[0]
 
     read_material, snapshot = read(scene, built(shader))
     assert read_material.base_image != NO_IMAGE and read_material.emission_image == NO_IMAGE

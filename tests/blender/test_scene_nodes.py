@@ -4,12 +4,11 @@
 import bpy
 import numpy as np
 import pytest
-from scene_builders import empty_scene, image, node, with_nodes
-
 from gridlight.scene.flat_render import render_socket
 from gridlight.scene.images import ImageTable
 from gridlight.scene.notices import Notices
 from gridlight.scene.shader_nodes import NodeEvaluator
+from scene_builders import empty_scene, image, node, with_nodes
 
 EDGE = 16
 RANDOM = np.random.default_rng(1)
@@ -62,8 +61,15 @@ def test_mix_color(tree, blend, factor):
 
 
 def test_mix_with_constant_and_clamping(tree):
-    made = node(tree, "ShaderNodeMix", {"Factor_Float": 1.7, "A_Color": texture(tree), "B_Color": (0.9, 0.1, 2, 1)},
-                data_type="RGBA", blend_type="ADD", clamp_factor=True, clamp_result=True)
+    made = node(
+        tree,
+        "ShaderNodeMix",
+        {"Factor_Float": 1.7, "A_Color": texture(tree), "B_Color": (0.9, 0.1, 2, 1)},
+        data_type="RGBA",
+        blend_type="ADD",
+        clamp_factor=True,
+        clamp_result=True,
+    )
     check(tree, made.outputs[2])
 
 
@@ -124,15 +130,18 @@ def test_math(tree, operation):
     assert np.allclose(value, render_socket(material, made.outputs[0], None, EDGE), atol=5e-4, rtol=5e-4)
 
 
-@pytest.mark.parametrize(("kind", "color", "inputs"), [
-    ("ShaderNodeGamma", "Color", {"Gamma": 2.2}),
-    ("ShaderNodeBrightContrast", "Color", {"Bright": 0.1, "Contrast": 0.4}),
-    ("ShaderNodeHueSaturation", "Color", {"Hue": 0.7, "Saturation": 1.4, "Value": 0.8, "Fac": 0.6}),
-    ("ShaderNodeInvert", "Color", {"Fac": 0.75}),
-    ("ShaderNodeRGBToBW", "Color", {}),
-    ("ShaderNodeClamp", "Value", {"Min": 0.3, "Max": 0.6}),
-    ("ShaderNodeMapRange", "Value", {"From Min": 0.2, "From Max": 0.8, "To Min": 1.0, "To Max": 0.0}),
-])
+@pytest.mark.parametrize(
+    ("kind", "color", "inputs"),
+    [
+        ("ShaderNodeGamma", "Color", {"Gamma": 2.2}),
+        ("ShaderNodeBrightContrast", "Color", {"Bright": 0.1, "Contrast": 0.4}),
+        ("ShaderNodeHueSaturation", "Color", {"Hue": 0.7, "Saturation": 1.4, "Value": 0.8, "Fac": 0.6}),
+        ("ShaderNodeInvert", "Color", {"Fac": 0.75}),
+        ("ShaderNodeRGBToBW", "Color", {}),
+        ("ShaderNodeClamp", "Value", {"Min": 0.3, "Max": 0.6}),
+        ("ShaderNodeMapRange", "Value", {"From Min": 0.2, "From Max": 0.8, "To Min": 1.0, "To Max": 0.0}),
+    ],
+)
 def test_color_nodes(tree, kind, color, inputs):
     made = node(tree, kind, {color: texture(tree), **inputs})
     check(tree, made.outputs[0], 1e-4)
@@ -164,15 +173,20 @@ def test_curves(tree):
 @pytest.mark.parametrize("mode", ["RGB", "HSV"])
 def test_separate_and_combine(tree, mode):
     parts = node(tree, "ShaderNodeSeparateColor", {"Color": texture(tree)}, mode=mode)
-    made = node(tree, "ShaderNodeCombineColor",
-                {"Red": parts.outputs[0], "Green": 0.4, "Blue": parts.outputs[2]}, mode=mode)
+    made = node(
+        tree, "ShaderNodeCombineColor", {"Red": parts.outputs[0], "Green": 0.4, "Blue": parts.outputs[2]}, mode=mode
+    )
     check(tree, made.outputs[0], 1e-4)
 
 
 def test_blackbody_in_a_mix(tree):
     body = node(tree, "ShaderNodeBlackbody", {"Temperature": 3000.0})
-    made = node(tree, "ShaderNodeMix", {"Factor_Float": 0.5, "A_Color": texture(tree), "B_Color": body.outputs[0]},
-                data_type="RGBA")
+    made = node(
+        tree,
+        "ShaderNodeMix",
+        {"Factor_Float": 0.5, "A_Color": texture(tree), "B_Color": body.outputs[0]},
+        data_type="RGBA",
+    )
     check(tree, made.outputs[2], 5e-3)
 
 
@@ -208,10 +222,24 @@ def test_muted_group_passes_through(tree):
 def test_mapping_agrees_with_cycles(tree, kind):
     """The texture's domain, sampled at the pixel centres of the square, gives what Cycles shows."""
     coordinates = node(tree, "ShaderNodeTexCoord")
-    mapping = node(tree, "ShaderNodeMapping", {"Vector": coordinates.outputs["UV"], "Location": (0.31, 0.17, 0.4),
-                                               "Rotation": (0.2, 0.1, 0.9), "Scale": (1.3, 0.7, 2.0)}, vector_type=kind)
-    shown = node(tree, "ShaderNodeTexImage", {"Vector": mapping.outputs[0]}, image=image("texture", PIXELS),
-                 interpolation="Closest")
+    mapping = node(
+        tree,
+        "ShaderNodeMapping",
+        {
+            "Vector": coordinates.outputs["UV"],
+            "Location": (0.31, 0.17, 0.4),
+            "Rotation": (0.2, 0.1, 0.9),
+            "Scale": (1.3, 0.7, 2.0),
+        },
+        vector_type=kind,
+    )
+    shown = node(
+        tree,
+        "ShaderNodeTexImage",
+        {"Vector": mapping.outputs[0]},
+        image=image("texture", PIXELS),
+        interpolation="Closest",
+    )
     notices = Notices()
     material = next(item for item in bpy.data.materials if item.node_tree == tree)
     value = NodeEvaluator("m", ImageTable(notices), notices, "m").output(shown.outputs["Color"], None)

@@ -6,7 +6,6 @@ import os
 
 import bpy
 import pytest
-
 from gridlight.core.errors import InputError
 from gridlight.scene.open_file import open_blend, set_frame
 
@@ -113,7 +112,7 @@ def test_what_is_no_blend_is_refused(tmp_path, content):
 def test_truncated_files_are_refused(blend, compress, share):
     path = blend(compress=compress)
     content = path.read_bytes()
-    path.write_bytes(content[:int(len(content) * share)])
+    path.write_bytes(content[: int(len(content) * share)])
     refused(path)
 
 

@@ -6,13 +6,12 @@ import math
 import bpy
 import numpy as np
 import pytest
-from mathutils import Euler, Matrix
-from scene_builders import empty_scene, material, place, quad
-
 from gridlight.core.errors import InputError
 from gridlight.core.grid import Grid
 from gridlight.scene.read import read_scene
 from gridlight.scene.volumes import create_volume, find_volumes, fit_volume, fitted_bounds
+from mathutils import Euler, Matrix
+from scene_builders import empty_scene, material, place, quad
 
 
 @pytest.fixture
@@ -35,7 +34,7 @@ def test_created_volumes_are_found_again(scene):
     item.hide_render = item.hide_viewport = True
     bpy.context.view_layer.update()
     place(None, "just an empty")
-    volume, = find_volumes(scene)
+    (volume,) = find_volumes(scene)
     assert volume.name == "Hall" and volume.resolution == (11, 4, 7)
     assert read_scene(scene).volumes[0].name == "Hall"
 

@@ -6,8 +6,6 @@ import math
 import bpy
 import numpy as np
 import pytest
-from scene_builders import empty_scene, image, material, node, place, quad, with_nodes
-
 from gridlight.core.panorama import (
     panorama_coordinates,
     panorama_directions,
@@ -16,6 +14,7 @@ from gridlight.core.panorama import (
 )
 from gridlight.scene.cycles_reference import render_panoramas
 from gridlight.scene.read import read_scene
+from scene_builders import empty_scene, image, material, node, place, quad, with_nodes
 
 WIDTH, HEIGHT = 64, 32
 
@@ -37,8 +36,9 @@ def background(scene, color=(1, 1, 1, 1), strength=1.0):
 def environment(scene, pixels, rotation=(0, 0, 0), kind="POINT"):
     tree, shader = background(scene, strength=2.0)
     coordinates = node(tree, "ShaderNodeTexCoord")
-    mapping = node(tree, "ShaderNodeMapping", {"Vector": coordinates.outputs["Generated"], "Rotation": rotation},
-                   vector_type=kind)
+    mapping = node(
+        tree, "ShaderNodeMapping", {"Vector": coordinates.outputs["Generated"], "Rotation": rotation}, vector_type=kind
+    )
     shown = node(tree, "ShaderNodeTexEnvironment", {"Vector": mapping.outputs[0]}, image=image("hdri", pixels))
     tree.links.new(shown.outputs[0], shader.inputs["Color"])
     return shown
@@ -93,7 +93,7 @@ def test_panoramas_look_where_the_layout_says(scene):
     seen = render_panoramas(scene, [(10, 20, 30)], WIDTH, HEIGHT, 16)[0]
     weights = panorama_solid_angles(WIDTH, HEIGHT)[..., None] * panorama_directions(WIDTH, HEIGHT)
     for channel in range(3):
-        mean = (weights * seen[..., channel:channel + 1]).sum(axis=(0, 1))
+        mean = (weights * seen[..., channel : channel + 1]).sum(axis=(0, 1))
         assert np.allclose(mean / np.linalg.norm(mean), np.eye(3)[channel], atol=0.01)
 
 
@@ -143,8 +143,11 @@ def test_light_path_and_camera_visibility_are_those_of_diffuse_rays(scene):
     tree, shader = background(scene)
     path = node(tree, "ShaderNodeLightPath")
     seen = node(tree, "ShaderNodeBackground", {"Color": (9, 0, 0, 1)})
-    mixed = node(tree, "ShaderNodeMixShader", {"Fac": path.outputs["Is Camera Ray"], "Shader": shader.outputs[0],
-                                               "Shader_001": seen.outputs[0]})
+    mixed = node(
+        tree,
+        "ShaderNodeMixShader",
+        {"Fac": path.outputs["Is Camera Ray"], "Shader": shader.outputs[0], "Shader_001": seen.outputs[0]},
+    )
     tree.links.new(mixed.outputs[0], tree.nodes["World Output"].inputs["Surface"])
     scene.world.cycles_visibility.camera = False
     assert np.allclose(read_scene(scene).world.map, 1, atol=1e-4)

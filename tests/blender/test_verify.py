@@ -54,8 +54,17 @@ def test_a_light_that_is_not_there_is_told(furnace, run_gridlight, tmp_path):
     scene = scenes.new_scene("Dark")
     scenes.add_box(scene, "Box", (-1, -1, -1), (1, 1, 1), scenes.diffuse((1, 1, 1)), inward=True)
     scenes.save(scene, tmp_path / "dark.blend")
-    done = run_gridlight("verify", tmp_path / "dark.blend", write_field(tmp_path / "p.exr", 1.0), "--points", 2, "--spp", 1,
-                         "--height", 8)
+    done = run_gridlight(
+        "verify",
+        tmp_path / "dark.blend",
+        write_field(tmp_path / "p.exr", 1.0),
+        "--points",
+        2,
+        "--spp",
+        1,
+        "--height",
+        8,
+    )
     assert done.returncode == 2
     assert "no light" in done.stderr
 
@@ -96,7 +105,8 @@ class TestPoints:
         points, normals = verify_points.surface_points(space, grid, 100, 0)
         assert len(points) == 100
         np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, rtol=1e-9)
-        # The underside of a box that stands on a cube's face is seen from below too: no ray can tell it from free space.
+        # The underside of a box that stands on a cube's face is seen from below too: no ray can tell it from free
+        # space.
         points, normals = points[normals[:, 2] > -0.5], normals[normals[:, 2] > -0.5]
         ahead = points + 0.02 * normals
         assert ((ahead > 0) & (ahead < scenes.ROOM_SIZE_M)).all()

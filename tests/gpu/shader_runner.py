@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs a test shader over linear arrays, so that each library of gpu_shaders/glsl can be asked directly."""
 
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 import gpu
@@ -13,7 +13,7 @@ _HERE = Path(__file__).parent / "glsl"
 _GROUP = 64
 
 
-@lru_cache(maxsize=None)
+@cache
 def _compile(name, libraries, samplers, layered, ints, defines):
     info = gpu.types.GPUShaderCreateInfo()
     for key, value in (("EXACT", "precise"), ("SHARED_", "shared"), ("NO_SURFACE", NO_SURFACE), *defines):
@@ -31,10 +31,14 @@ def _compile(name, libraries, samplers, layered, ints, defines):
     return gpu.shader.create_from_info(info)
 
 
-def run(name, count, *, libraries=(), inputs=None, textures_2d=None, layered=None, ints=None, defines=None, elements=None):
-    """(elements, 4) float32 that ``glsl/NAME.glsl`` wrote for ``count`` threads, ``elements`` being ``count`` unless told.
+def run(
+    name, count, *, libraries=(), inputs=None, textures_2d=None, layered=None, ints=None, defines=None, elements=None
+):
+    """(elements, 4) float32 that ``glsl/NAME.glsl`` wrote for ``count`` threads, ``elements`` being ``count`` unless
+    told.
 
-    ``inputs`` are arrays (n, ≤4) uploaded as linear arrays, ``textures_2d`` and ``layered`` GPU textures by sampler name.
+    ``inputs`` are arrays (n, ≤4) uploaded as linear arrays, ``textures_2d`` and ``layered`` GPU textures by sampler
+    name.
     """
     uploaded = {}
     for key, values in (inputs or {}).items():
@@ -44,8 +48,14 @@ def run(name, count, *, libraries=(), inputs=None, textures_2d=None, layered=Non
         uploaded[key] = textures.upload(padded, "test input")
     samplers = {**uploaded, **(textures_2d or {})}
     layered, ints = layered or {}, ints or {}
-    shader = _compile(name, tuple(libraries), tuple(samplers), tuple(layered), tuple(ints),
-                      tuple((key, str(value)) for key, value in (defines or {}).items()))
+    shader = _compile(
+        name,
+        tuple(libraries),
+        tuple(samplers),
+        tuple(layered),
+        tuple(ints),
+        tuple((key, str(value)) for key, value in (defines or {}).items()),
+    )
     result = textures.allocate(elements or count, "test output")
     for key, texture in {**samplers, **layered}.items():
         shader.uniform_sampler(key, texture)
@@ -59,5 +69,11 @@ def run(name, count, *, libraries=(), inputs=None, textures_2d=None, layered=Non
 def read_layers(texture, width, height, layers):
     """(layers, height, width, 4) float32 copy of a layered image; ``GPUTexture.read`` returns its first layer only."""
     count = width * height * layers
-    values = run("copy_layers", count, libraries=["data_lib"], layered={"source": texture}, ints={"width": width, "height": height})
+    values = run(
+        "copy_layers",
+        count,
+        libraries=["data_lib"],
+        layered={"source": texture},
+        ints={"width": width, "height": height},
+    )
     return values.reshape(layers, height, width, 4)

@@ -43,13 +43,19 @@ def snapshot_of(corners, material=None, materials=(), objects=None, uvs=None, **
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     objects = np.zeros(count, np.int32) if objects is None else np.asarray(objects, np.int32)
     return SceneSnapshot(
-        vertices=corners.reshape(-1, 3), triangles=np.arange(3 * count, dtype=np.int32).reshape(-1, 3),
+        vertices=corners.reshape(-1, 3),
+        triangles=np.arange(3 * count, dtype=np.int32).reshape(-1, 3),
         corner_normals=np.repeat(normal[:, None], 3, axis=1).astype(np.float32),
         corner_uvs=np.zeros((count, 3, 2), np.float32) if uvs is None else np.asarray(uvs, np.float32),
         material_index=np.zeros(count, np.int32) if material is None else np.asarray(material, np.int32),
-        object_index=objects, object_names=[f"object {i}" for i in range(int(objects.max(initial=0)) + 1)],
-        materials=list(materials) or [Material("grey")], images=options.pop("images", []), lights=options.pop("lights", []),
-        world=options.pop("world", World()), **options)
+        object_index=objects,
+        object_names=[f"object {i}" for i in range(int(objects.max(initial=0)) + 1)],
+        materials=list(materials) or [Material("grey")],
+        images=options.pop("images", []),
+        lights=options.pop("lights", []),
+        world=options.pop("world", World()),
+        **options,
+    )
 
 
 def box(low=(-1, -1, -1), high=(1, 1, 1)):
@@ -82,22 +88,44 @@ def all_lights():
     return {
         "point": Light("point", "POINT", color, frame((0.3, 0.5, 0.7))),
         "point soft": Light("point soft", "POINT", color, frame((0.3, 0.45, 0.7)), radius=0.15),
-        "point sphere": Light("point sphere", "POINT", color, frame((-0.5, 0.4, 0.66)), radius=0.15, soft_falloff=False),
+        "point sphere": Light(
+            "point sphere", "POINT", color, frame((-0.5, 0.4, 0.66)), radius=0.15, soft_falloff=False
+        ),
         "spot": Light("spot", "SPOT", color, frame((0.5, 0.4, 0.8), (-0.3, -0.2, -1)), spot_size=1.2, spot_blend=0.4),
-        "spot soft": Light("spot soft", "SPOT", color, frame((0.5, -0.4, 0.8), (-0.3, 0.2, -1)), spot_size=1.0, spot_blend=0.2, radius=0.1),
-        "spot scaled": Light("spot scaled", "SPOT", color, frame((0.5, -0.4, 0.8), (-0.3, 0.2, -1)), spot_size=1.0, spot_blend=0.2,
-                             spot_scale=(1.0, 2.0, 1.5)),
+        "spot soft": Light(
+            "spot soft",
+            "SPOT",
+            color,
+            frame((0.5, -0.4, 0.8), (-0.3, 0.2, -1)),
+            spot_size=1.0,
+            spot_blend=0.2,
+            radius=0.1,
+        ),
+        "spot scaled": Light(
+            "spot scaled",
+            "SPOT",
+            color,
+            frame((0.5, -0.4, 0.8), (-0.3, 0.2, -1)),
+            spot_size=1.0,
+            spot_blend=0.2,
+            spot_scale=(1.0, 2.0, 1.5),
+        ),
         "sun": Light("sun", "SUN", color, frame(towards=(0.3, 0.4, -0.8))),
         "sun wide": Light("sun wide", "SUN", color, frame(towards=(-0.3, 0.4, -0.8)), angle=0.3),
         "rectangle": Light("rectangle", "AREA", color, frame((0.1, 0.2, 0.9), (0.1, 0, -1)), size_x=0.5, size_y=0.3),
-        "ellipse": Light("ellipse", "AREA", color, frame((-0.1, -0.3, 0.9), (0, 0.2, -1)), shape="ELLIPSE", size_x=0.4, size_y=0.7),
-        "spread": Light("spread", "AREA", color, frame((-0.1, 0.3, 0.9), (0, 0.2, -1)), size_x=0.3, size_y=0.3, spread=1.5),
+        "ellipse": Light(
+            "ellipse", "AREA", color, frame((-0.1, -0.3, 0.9), (0, 0.2, -1)), shape="ELLIPSE", size_x=0.4, size_y=0.7
+        ),
+        "spread": Light(
+            "spread", "AREA", color, frame((-0.1, 0.3, 0.9), (0, 0.2, -1)), size_x=0.3, size_y=0.3, spread=1.5
+        ),
         "shadowless": Light("shadowless", "POINT", color, frame((-0.3, 0.5, -0.6)), casts_shadow=False),
     }
 
 
 def cluttered_room(lights=None, seed=0, clutter=24):
-    """A room with one side open to the sky, pieces of it textured, one wall glowing, and triangles flying about, some with holes."""
+    """A room with one side open to the sky, pieces of it textured, one wall glowing, and triangles flying about, some
+    with holes."""
     generator = np.random.default_rng(seed)
     walls = box((-1.6, -1.3, -1.1), (1.5, 1.4, 1.2))[:, ::-1]
     walls = np.delete(walls, (1, 7), axis=0)  # the ceiling is the sky
@@ -121,12 +149,21 @@ def cluttered_room(lights=None, seed=0, clutter=24):
     uvs = generator.uniform(-1, 2, (len(corners), 3, 2))
     # What glows belongs to the walls: as a large object it is light that the field carries, not lamps that are sampled.
     objects = np.where(np.isin(material, (2, 3)), 0, np.concatenate([np.zeros(10, int), 1 + np.arange(clutter) % 4]))
-    return snapshot_of(corners, material, materials, objects, uvs, images=images, world=World(map=sky),
-                       lights=list((all_lights() if lights is None else lights).values()))
+    return snapshot_of(
+        corners,
+        material,
+        materials,
+        objects,
+        uvs,
+        images=images,
+        world=World(map=sky),
+        lights=list((all_lights() if lights is None else lights).values()),
+    )
 
 
 def moved(snapshot, matrix):
-    """``snapshot`` under ``matrix`` (4, 4), a rotation, translation and uniform scale; light of lamps is not rescaled."""
+    """``snapshot`` under ``matrix`` (4, 4), a rotation, translation and uniform scale; light of lamps is not
+    rescaled."""
     scale = np.cbrt(np.linalg.det(matrix[:3, :3]))
     rotation = matrix[:3, :3] / scale
     lights = []
@@ -136,5 +173,8 @@ def moved(snapshot, matrix):
         placed[:3, 3] = matrix[:3, :3] @ light.matrix[:3, 3] + matrix[:3, 3]
         lights.append(replace(light, matrix=placed))
     return replace(
-        snapshot, vertices=snapshot.vertices @ matrix[:3, :3].T + matrix[:3, 3],
-        corner_normals=(snapshot.corner_normals @ rotation.T).astype(np.float32), lights=lights)
+        snapshot,
+        vertices=snapshot.vertices @ matrix[:3, :3].T + matrix[:3, 3],
+        corner_normals=(snapshot.corner_normals @ rotation.T).astype(np.float32),
+        lights=lights,
+    )

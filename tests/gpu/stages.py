@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One bake taken apart: every stage on the GPU, read back, beside the reference fed with what the GPU had before that stage."""
+"""One bake taken apart: every stage on the GPU, read back, beside the reference fed with what the GPU had before that
+stage."""
 
 import numpy as np
 from gridlight.core.conventions import INVALID
@@ -49,8 +50,14 @@ class Stages:
         distance = np.abs(geometry[..., 2]).astype(float)
         distance[distance > BACKGROUND] = np.inf
         normal = octahedral_decode(geometry[..., :2])
-        return TexelSurfaces(distance, self.triangles(), geometry[..., 2] < 0, normal, albedo[..., :3].astype(float),
-                             emission[..., :3].astype(float))
+        return TexelSurfaces(
+            distance,
+            self.triangles(),
+            geometry[..., 2] < 0,
+            normal,
+            albedo[..., :3].astype(float),
+            emission[..., :3].astype(float),
+        )
 
     def statistics(self):
         """The GPU's states and depth as a field without light."""
@@ -98,4 +105,3 @@ class Stages:
         for _ in range(times):
             field.coefficients = self.reference.iterate(surfaces, source, field, lookups)
         return field.coefficients
-

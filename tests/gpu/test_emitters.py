@@ -23,9 +23,12 @@ def panel(half_x, half_y, height):
 def room_with_panel(half_x=0.1, half_y=0.05, height=0.9, albedo=1.0):
     """A large room without a bounce to speak of and a lamp near its ceiling."""
     room = box((-4, -4, -1), (4, 4, 1))[:, ::-1]
-    return snapshot_of(np.concatenate([room, panel(half_x, half_y, height)]), np.repeat([0, 1], [12, 2]),
-                       [Material("white", (albedo,) * 3), Material("lamp", (0.0, 0.0, 0.0), emission=tuple(RADIANCE))],
-                       np.repeat([0, 1], [12, 2]))
+    return snapshot_of(
+        np.concatenate([room, panel(half_x, half_y, height)]),
+        np.repeat([0, 1], [12, 2]),
+        [Material("white", (albedo,) * 3), Material("lamp", (0.0, 0.0, 0.0), emission=tuple(RADIANCE))],
+        np.repeat([0, 1], [12, 2]),
+    )
 
 
 def grid(resolution=(3, 3, 2)):
@@ -41,7 +44,8 @@ def test_a_small_lamp_is_sampled_by_area_and_luminance():
 
 
 def test_light_of_a_small_lamp_on_the_floor():
-    """E = π L F of a parallel rectangle seen from the floor (Howell, B-4): four corners with sign. The floor is white: E = π · source."""
+    """E = π L F of a parallel rectangle seen from the floor (Howell, B-4): four corners with sign. The floor is white:
+    E = π · source."""
     stages = Stages(room_with_panel(), grid((2, 1, 1)), BakeSettings(keep_all=True, samples=64, face=32))
     stages.statistics()
     surfaces, source = stages.surfaces(), stages.source()
@@ -63,7 +67,8 @@ def test_light_of_a_small_lamp_on_the_floor():
 
 @pytest.mark.parametrize("half", [0.02, 0.1, 0.4])
 def test_a_probe_sees_a_lamp_smaller_than_its_texels(half):
-    """Band 0 of a lamp is Y₀₀ L Ω, Ω of a rectangle 4·atan2(ab, h √(a² + b² + h²)) below its middle, by signs elsewhere."""
+    """Band 0 of a lamp is Y₀₀ L Ω, Ω of a rectangle 4·atan2(ab, h √(a² + b² + h²)) below its middle, by signs
+    elsewhere."""
     snapshot = room_with_panel(half, half, albedo=0.0)
     volume = grid()
     result = bake(snapshot, volume, BakeSettings(keep_all=True, face=8))
@@ -90,8 +95,13 @@ def test_furnace_with_traced_bounces(albedo, gather):
 
 
 def test_traced_bounces_see_the_world():
-    """A grey box under a uniform sky, in a probe above: L of the sky, and albedo · L where a convex body is lit by all of it."""
-    snapshot = snapshot_of(box((-0.5, -0.5, -2), (0.5, 0.5, -1)), materials=[Material("grey", (0.5, 0.5, 0.5))], world=World((1.0, 1.0, 1.0)))
+    """A grey box under a uniform sky, in a probe above: L of the sky, and albedo · L where a convex body is lit by all
+    of it."""
+    snapshot = snapshot_of(
+        box((-0.5, -0.5, -2), (0.5, 0.5, -1)),
+        materials=[Material("grey", (0.5, 0.5, 0.5))],
+        world=World((1.0, 1.0, 1.0)),
+    )
     volume = Grid.from_bounds([-0.2] * 3, [0.2] * 3, (2, 2, 2))
     result = bake(snapshot, volume, BakeSettings(gather=1, keep_all=True, samples=64))
     found = irradiance_at_nodes(result.field, np.array([[0, 0, 1.0], [0, 0, -1.0]]))

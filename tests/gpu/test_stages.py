@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every stage of a bake on the GPU against the reference bake, on a room with textures, holes, emission, a sky and all lights.
+"""Every stage of a bake on the GPU against the reference bake, on a room with textures, holes, emission, a sky and all
+lights.
 
-Stages are compared one by one, each fed with the GPU's results so far. So the tolerance stays at 1e-5 throughout, and rays that graze an
-edge, where float32 and float64 rightly choose different triangles, do not spread.
+Stages are compared one by one, each fed with the GPU's results so far. So the tolerance stays at 1e-5 throughout, and
+rays that graze an edge, where float32 and float64 rightly choose different triangles, do not spread.
 """
 
 import numpy as np
@@ -52,7 +53,8 @@ def test_capture(stages, expected, method):
     assert np.quantile(np.abs(found.distance[hit] / expected.distance[hit] - 1), 0.95) < 1e-5
     assert (found.back == expected.back)[hit].all()
     assert close(found.normal, expected.normal, 2e-5)[hit].mean() > 0.999
-    # an image's mip level may round the other way, and barycentrics of slanted hits lose digits: texture lookups spread them
+    # an image's mip level may round the other way, and barycentrics of slanted hits lose digits: texture lookups
+    # spread them
     assert close(found.albedo, expected.albedo, 1e-4)[same].mean() > 0.99
     assert close(found.emission, expected.emission, 1e-4)[same].mean() > 0.99
     assert close(found.emission, expected.emission, 1e-6)[same & (found.triangle < 0)].all()
@@ -62,7 +64,9 @@ def test_capture(stages, expected, method):
 def test_statistics(stages):
     surfaces = stages.surfaces()
     found, nodes = stages.statistics(), stages.reference.nodes
-    np.testing.assert_allclose(stages.backend.read_shares(), stages.reference.shares(surfaces, stages.source()), atol=1e-5)
+    np.testing.assert_allclose(
+        stages.backend.read_shares(), stages.reference.shares(surfaces, stages.source()), atol=1e-5
+    )
     expected = stages.reference.depth_moments(surfaces)
     # an odd face puts directions exactly on borders of texels, where rounding picks the neighbour; 8 and 16 do not
     agree = np.abs(found.depth[nodes] - expected) <= 1e-5 * expected.max()
@@ -88,8 +92,12 @@ def test_lookup_weights(stages):
     blended, expected_blend = np.zeros((*hit.shape, GRID.count)), np.zeros((*hit.shape, GRID.count))
     for corner in range(8):  # as weights of nodes: a point on a cell's face may belong to either cell
         for total, index, share in ((blended, nodes, weights), (expected_blend, expected_nodes, expected_weights)):
-            np.put_along_axis(total, index[..., corner, None],
-                              np.take_along_axis(total, index[..., corner, None], -1) + share[..., corner, None], -1)
+            np.put_along_axis(
+                total,
+                index[..., corner, None],
+                np.take_along_axis(total, index[..., corner, None], -1) + share[..., corner, None],
+                -1,
+            )
     error = np.abs(blended - expected_blend).max(axis=-1)[hit]
     assert (error < 1.5e-3).mean() > 0.999, "half floats: 2⁻¹¹, once more from the sum"
     np.testing.assert_allclose(weights.sum(axis=-1)[hit], 1, atol=3e-3)
@@ -97,7 +105,9 @@ def test_lookup_weights(stages):
 
 @pytest.mark.parametrize("name", all_lights())
 def test_source_of_each_light(name):
-    stages = Stages(cluttered_room({name: all_lights()[name]}), GRID, BakeSettings(face=6, keep_all=True, seed=3, samples=3))
+    stages = Stages(
+        cluttered_room({name: all_lights()[name]}), GRID, BakeSettings(face=6, keep_all=True, seed=3, samples=3)
+    )
     surfaces = stages.surfaces()
     found, expected = stages.source(), stages.reference.source(surfaces)
     lit = expected - surfaces.emission

@@ -23,14 +23,22 @@ def grid_mesh(cells):
     """A flat square of 2·cells² equal triangles."""
     x, y = np.meshgrid(np.arange(cells), np.arange(cells))
     corner = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], 1)[:, None].astype(np.float32)
-    return np.concatenate([corner + np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0]]), corner + np.float32([[0, 0, 0], [1, 1, 0], [0, 1, 0]])])
+    return np.concatenate(
+        [corner + np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0]]), corner + np.float32([[0, 0, 0], [1, 1, 0], [0, 1, 0]])]
+    )
 
 
 SCENES = {
-    "one": random_triangles(1), "two": random_triangles(2), "three": random_triangles(3), "five": random_triangles(5),
-    "random": random_triangles(3000), "large and small": np.concatenate([random_triangles(500, 2, 0.01), random_triangles(20, 3, 3.0)]),
-    "flat mesh": grid_mesh(30), "coincident": np.tile(random_triangles(1), (500, 1, 1)),
-    "points": np.repeat(random_triangles(200)[:, :1], 3, axis=1), "far away": random_triangles(500) + np.float32(1000),
+    "one": random_triangles(1),
+    "two": random_triangles(2),
+    "three": random_triangles(3),
+    "five": random_triangles(5),
+    "random": random_triangles(3000),
+    "large and small": np.concatenate([random_triangles(500, 2, 0.01), random_triangles(20, 3, 3.0)]),
+    "flat mesh": grid_mesh(30),
+    "coincident": np.tile(random_triangles(1), (500, 1, 1)),
+    "points": np.repeat(random_triangles(200)[:, :1], 3, axis=1),
+    "far away": random_triangles(500) + np.float32(1000),
 }
 
 
@@ -75,7 +83,9 @@ def test_boxes_contain_what_is_below_them(triangles):
     boxes = hierarchy.nodes[:, :6].reshape(-1, 2, 3, bvh.WIDTH)
     for node, slot, first, stop in leaves(hierarchy):
         corners = triangles[hierarchy.order[first:stop]].reshape(-1, 3)
-        assert (boxes[node, 0, :, slot] == corners.min(axis=0)).all() and (boxes[node, 1, :, slot] == corners.max(axis=0)).all()
+        assert (boxes[node, 0, :, slot] == corners.min(axis=0)).all() and (
+            boxes[node, 1, :, slot] == corners.max(axis=0)
+        ).all()
     for node in range(len(boxes)):
         for slot in range(bvh.WIDTH):
             child = int(hierarchy.nodes[node, 6, slot])
@@ -149,13 +159,17 @@ def test_a_million_triangles_build_in_three_seconds():
     assert seconds < 3
 
 
-# Rays ---------------------------------------------------------------------------------------------------------------------
+# Rays
+# ---------------------------------------------------------------------------------------------------------------------
 
 
 def test_a_ray_against_a_triangle_in_closed_form():
     triangle = np.array([[[0, 0, 2.0], [4, 0, 2], [0, 4, 2]]])
-    hits = rays.closest_hit(triangle, np.array([[1.0, 2, 0], [3, 3, 0], [1, 2, 4], [1, 2, 4]]),
-                            np.array([[0, 0, 1.0], [0, 0, 1], [0, 0, -1], [0, 0, 1]]))
+    hits = rays.closest_hit(
+        triangle,
+        np.array([[1.0, 2, 0], [3, 3, 0], [1, 2, 4], [1, 2, 4]]),
+        np.array([[0, 0, 1.0], [0, 0, 1], [0, 0, -1], [0, 0, 1]]),
+    )
     np.testing.assert_allclose(hits.distance, [2, np.inf, 2, np.inf])
     np.testing.assert_array_equal(hits.triangle, [0, -1, 0, -1])
     np.testing.assert_allclose(hits.barycentric[0], [0.25, 0.5], atol=1e-15)
@@ -167,7 +181,9 @@ def test_rays_at_shared_edges_and_corners_hit_something():
     targets = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
     for origin in ([2.0, 2, 5], [0.3, 7, 2], [-3, -3, 0.5]):
         directions = targets - origin
-        distance = rays.closest_hit(mesh * [1.25, 1.25, 1] - [0.5, 0.5, 0], np.tile(origin, (len(directions), 1)), directions).distance
+        distance = rays.closest_hit(
+            mesh * [1.25, 1.25, 1] - [0.5, 0.5, 0], np.tile(origin, (len(directions), 1)), directions
+        ).distance
         np.testing.assert_allclose(distance, 1, rtol=1e-12)
 
 
@@ -175,11 +191,16 @@ def test_no_ray_escapes_a_closed_mesh():
     generator = np.random.default_rng(0)
     corners = np.array(list(np.ndindex(2, 2, 2)), float) + generator.uniform(-0.1, 0.1, (8, 3))
     quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    mesh = np.array([[corners[a], corners[b], corners[c]] for a, b, c, _ in quads] + [[corners[a], corners[c], corners[d]] for a, b, c, d in quads])
+    mesh = np.array(
+        [[corners[a], corners[b], corners[c]] for a, b, c, _ in quads]
+        + [[corners[a], corners[c], corners[d]] for a, b, c, d in quads]
+    )
     # two thirds of the rays aim at edges and corners, where leaks are
     onto_edges = mesh[generator.integers(0, 12, 20_000)]
     t = generator.random((20_000, 1))
-    targets = np.concatenate([onto_edges[:, 0] * t + onto_edges[:, 1] * (1 - t), corners[generator.integers(0, 8, 1000)]])
+    targets = np.concatenate(
+        [onto_edges[:, 0] * t + onto_edges[:, 1] * (1 - t), corners[generator.integers(0, 8, 1000)]]
+    )
     origins = generator.uniform(0.3, 0.7, targets.shape)
     assert np.isfinite(rays.closest_hit(mesh, origins, targets - origins).distance).all()
 

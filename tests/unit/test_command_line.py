@@ -44,19 +44,23 @@ def assert_one_line(done, status, *words):
         assert word in lines[0]
 
 
-# --- arguments ---------------------------------------------------------------------------------------------------------
+# --- arguments
+# ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("given", "read"), [
-    (["--min", "-1,-2,0", "--max", "1,1,1"], ["--min=-1,-2,0", "--max", "1,1,1"]),
-    (["--min", "-.5,0,0"], ["--min=-.5,0,0"]),
-    (["--min", "-1e-3,0,0"], ["--min=-1e-3,0,0"]),
-    (["--min"], ["--min"]),
-    (["--min", "--max", "1,1,1"], ["--min", "--max", "1,1,1"]),
-    (["--min", "-o"], ["--min", "-o"]),
-    (["--", "--min", "-1,0,0"], ["--", "--min", "-1,0,0"]),
-    (["--frame", "-3"], ["--frame=-3"]),
-])
+@pytest.mark.parametrize(
+    ("given", "read"),
+    [
+        (["--min", "-1,-2,0", "--max", "1,1,1"], ["--min=-1,-2,0", "--max", "1,1,1"]),
+        (["--min", "-.5,0,0"], ["--min=-.5,0,0"]),
+        (["--min", "-1e-3,0,0"], ["--min=-1e-3,0,0"]),
+        (["--min"], ["--min"]),
+        (["--min", "--max", "1,1,1"], ["--min", "--max", "1,1,1"]),
+        (["--min", "-o"], ["--min", "-o"]),
+        (["--", "--min", "-1,0,0"], ["--", "--min", "-1,0,0"]),
+        (["--frame", "-3"], ["--frame=-3"]),
+    ],
+)
 def test_values_with_a_minus_sign(given, read):
     assert arguments.join_signed_values(given) == read
 
@@ -73,30 +77,36 @@ def test_lengths_that_are_none(text):
         arguments.length(text)
 
 
-@pytest.mark.parametrize(("options", "words"), [
-    ([], ["bake", "eval"]),
-    (["nonsense"], ["nonsense"]),
-    (["bake"], ["FILE.blend"]),
-    (["bake", "x.blend"], ["-o"]),
-    (["bake", "x.blend", "-o", "out"], ["x.blend", "no such file"]),
-    (["bake", "x.blend", "-o", "out", "--bands", "5"], ["--bands is 5", "1 and 4"]),
-    (["bake", "x.blend", "-o", "out", "--bands", "three"], ["--bands", "three"]),
-    (["bake", "x.blend", "-o", "out", "--face", "1000"], ["--face is 1000"]),
-    (["bake", "x.blend", "-o", "out", "--bounces", "-1"], ["--bounces is -1"]),
-    (["bake", "x.blend", "-o", "out", "--bounces", "many"], ["--bounces", "many"]),
-    (["bake", "x.blend", "-o", "out", "--tolerance", "nan"], ["--tolerance is nan"]),
-    (["bake", "x.blend", "-o", "out", "--memory", "0"], ["--memory is 0"]),
-    (["bake", "x.blend", "-o", "out", "--capture", "magic"], ["--capture", "magic"]),
-    (["bake", "x.blend", "-o", "out", "--min", "0,0,0"], ["--min and --max"]),
-    (["bake", "x.blend", "-o", "out", "--min", "0,0,0", "--max", "1,1,1"], ["--resolution"]),
-    (["bake", "x.blend", "-o", "out", "--min", "0,0,0", "--max", "1,1,1", "--resolution", "2,2"], ["--resolution", "2,2"]),
-    (["bake", "x.blend", "-o", "out", "--resolution", "2,2,2", "--spacing", "1"], ["exclude each other"]),
-    (["bake", "x.blend", "-o", "out", "--spacing", "-1"], ["--spacing", "-1"]),
-    (["bake", "x.blend", "-o", "out", "--nonsense"], ["--nonsense"]),
-    (["bake", "x.blend", "-o", "out", "--band", "3"], ["--band"]),
-    (["info"], ["PROBES.exr"]),
-    (["info", "nope.exr"], ["nope.exr", "No such file"]),
-])
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ([], ["bake", "eval"]),
+        (["nonsense"], ["nonsense"]),
+        (["bake"], ["FILE.blend"]),
+        (["bake", "x.blend"], ["-o"]),
+        (["bake", "x.blend", "-o", "out"], ["x.blend", "no such file"]),
+        (["bake", "x.blend", "-o", "out", "--bands", "5"], ["--bands is 5", "1 and 4"]),
+        (["bake", "x.blend", "-o", "out", "--bands", "three"], ["--bands", "three"]),
+        (["bake", "x.blend", "-o", "out", "--face", "1000"], ["--face is 1000"]),
+        (["bake", "x.blend", "-o", "out", "--bounces", "-1"], ["--bounces is -1"]),
+        (["bake", "x.blend", "-o", "out", "--bounces", "many"], ["--bounces", "many"]),
+        (["bake", "x.blend", "-o", "out", "--tolerance", "nan"], ["--tolerance is nan"]),
+        (["bake", "x.blend", "-o", "out", "--memory", "0"], ["--memory is 0"]),
+        (["bake", "x.blend", "-o", "out", "--capture", "magic"], ["--capture", "magic"]),
+        (["bake", "x.blend", "-o", "out", "--min", "0,0,0"], ["--min and --max"]),
+        (["bake", "x.blend", "-o", "out", "--min", "0,0,0", "--max", "1,1,1"], ["--resolution"]),
+        (
+            ["bake", "x.blend", "-o", "out", "--min", "0,0,0", "--max", "1,1,1", "--resolution", "2,2"],
+            ["--resolution", "2,2"],
+        ),
+        (["bake", "x.blend", "-o", "out", "--resolution", "2,2,2", "--spacing", "1"], ["exclude each other"]),
+        (["bake", "x.blend", "-o", "out", "--spacing", "-1"], ["--spacing", "-1"]),
+        (["bake", "x.blend", "-o", "out", "--nonsense"], ["--nonsense"]),
+        (["bake", "x.blend", "-o", "out", "--band", "3"], ["--band"]),
+        (["info"], ["PROBES.exr"]),
+        (["info", "nope.exr"], ["nope.exr", "No such file"]),
+    ],
+)
 def test_wrong_options_end_in_one_line(run_gridlight, tmp_path, options, words):
     assert_one_line(run_gridlight(*options, cwd=tmp_path), 2, *words)
     assert not list(tmp_path.iterdir())
@@ -109,7 +119,8 @@ def test_help_names_the_commands(run_gridlight):
         assert command in done.stdout
 
 
-# --- info and diff -----------------------------------------------------------------------------------------------------
+# --- info and diff
+# -----------------------------------------------------------------------------------------------------
 
 
 def test_info_says_what_the_file_holds(run_gridlight, constant_file):
@@ -124,11 +135,18 @@ def test_info_says_what_the_file_holds(run_gridlight, constant_file):
 
 
 def test_info_is_quick_and_loads_no_blender(constant_file, root):
-    program = ("import runpy, sys\nsys.argv = ['gridlight', 'info', sys.argv[1]]\n"
-               f"try: runpy.run_path({str(root / 'cli' / '__main__.py')!r}, run_name='__main__')\n"
-               "except SystemExit as end: print(end.code, sorted({'bpy', 'gpu', 'mathutils'} & set(sys.modules)))\n")
-    done = subprocess.run([sys.executable, "-I", "-c", program, str(constant_file)], capture_output=True, text=True,
-                          check=False, timeout=60)
+    program = (
+        "import runpy, sys\nsys.argv = ['gridlight', 'info', sys.argv[1]]\n"
+        f"try: runpy.run_path({str(root / 'cli' / '__main__.py')!r}, run_name='__main__')\n"
+        "except SystemExit as end: print(end.code, sorted({'bpy', 'gpu', 'mathutils'} & set(sys.modules)))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-I", "-c", program, str(constant_file)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
     assert done.stdout.splitlines()[-1] == "0 []", done.stderr
 
 
@@ -138,7 +156,10 @@ def test_diff_finds_the_probe_that_changed(run_gridlight, constant_file, tmp_pat
     field.state[3] = CULLED
     other = tmp_path / "other.exr"
     probe_file.write(other, field)
-    same, changed = last_json(run_gridlight("diff", constant_file, constant_file)), run_gridlight("diff", constant_file, other)
+    same, changed = (
+        last_json(run_gridlight("diff", constant_file, constant_file)),
+        run_gridlight("diff", constant_file, other),
+    )
     assert same["identical"] and same["rms"] == 0
     assert changed.returncode == 0
     summary = last_json(changed)
@@ -157,7 +178,8 @@ def test_diff_of_different_grids_is_refused(run_gridlight, constant_file, tmp_pa
     assert_one_line(run_gridlight("diff", constant_file, other), 2, "different grids")
 
 
-# --- eval --------------------------------------------------------------------------------------------------------------
+# --- eval
+# --------------------------------------------------------------------------------------------------------------
 
 
 def test_eval_of_constant_radiance_is_pi_times_it(run_gridlight, constant_file, tmp_path):
@@ -183,21 +205,26 @@ def test_eval_accepts_what_spreadsheets_write(run_gridlight, constant_file, tmp_
     np.testing.assert_allclose(back[:, 6:], np.pi * np.array([[1, 2, 3]] * 2), rtol=2e-6)
 
 
-@pytest.mark.parametrize(("content", "words"), [
-    ("", ["line 1", "header"]),
-    ("1,2,3,0,0,1\n", ["line 1", "header"]),
-    ("x,y,z\n", ["line 1", "header"]),
-    ("x,y,z,nx,ny,nz\n0,0,0,0,0,1\n0,0,0,0,0\n", ["line 3", "six numbers"]),
-    ("x,y,z,nx,ny,nz\n\n0,0,0,0,0,1,7\n", ["line 3", "six numbers"]),
-    ("x,y,z,nx,ny,nz\n0,0,0,0,0,one\n", ["line 2", "six numbers"]),
-    ("x,y,z,nx,ny,nz\n0,0,0,0,0,1\nnan,0,0,0,0,1\n", ["line 3", "not finite"]),
-    ("x,y,z,nx,ny,nz\n0,0,0,0,0,inf\n", ["line 2", "not finite"]),
-    ("x,y,z,nx,ny,nz\n0,0,0,0,0,0\n", ["line 2", "length zero"]),
-])
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("", ["line 1", "header"]),
+        ("1,2,3,0,0,1\n", ["line 1", "header"]),
+        ("x,y,z\n", ["line 1", "header"]),
+        ("x,y,z,nx,ny,nz\n0,0,0,0,0,1\n0,0,0,0,0\n", ["line 3", "six numbers"]),
+        ("x,y,z,nx,ny,nz\n\n0,0,0,0,0,1,7\n", ["line 3", "six numbers"]),
+        ("x,y,z,nx,ny,nz\n0,0,0,0,0,one\n", ["line 2", "six numbers"]),
+        ("x,y,z,nx,ny,nz\n0,0,0,0,0,1\nnan,0,0,0,0,1\n", ["line 3", "not finite"]),
+        ("x,y,z,nx,ny,nz\n0,0,0,0,0,inf\n", ["line 2", "not finite"]),
+        ("x,y,z,nx,ny,nz\n0,0,0,0,0,0\n", ["line 2", "length zero"]),
+    ],
+)
 def test_eval_names_the_line_that_is_wrong(run_gridlight, constant_file, tmp_path, content, words):
     points, folder = tmp_path / "p.csv", tmp_path / "out"
     points.write_text(content)
-    assert_one_line(run_gridlight("eval", constant_file, "--points", points, "-o", folder / "e.csv"), 2, "p.csv", *words)
+    assert_one_line(
+        run_gridlight("eval", constant_file, "--points", points, "-o", folder / "e.csv"), 2, "p.csv", *words
+    )
     assert not folder.exists()
 
 
@@ -216,12 +243,16 @@ def test_eval_without_points_warns(run_gridlight, constant_file, tmp_path):
 def test_eval_keeps_the_old_result_when_it_fails(run_gridlight, constant_file, tmp_path):
     (tmp_path / "p.csv").write_text("x,y,z,nx,ny,nz\n0,0,0,0,0,0\n")
     (tmp_path / "e.csv").write_text("old")
-    assert run_gridlight("eval", constant_file, "--points", tmp_path / "p.csv", "-o", tmp_path / "e.csv").returncode == 2
+    assert (
+        run_gridlight("eval", constant_file, "--points", tmp_path / "p.csv", "-o", tmp_path / "e.csv").returncode == 2
+    )
     assert (tmp_path / "e.csv").read_text() == "old" and len(list(tmp_path.iterdir())) == 3
 
 
-@pytest.mark.parametrize(("target", "words"), [("/proc/e.csv", ["/proc"]), ("{file}/e.csv", ["Not a directory"]),
-                                               ("{folder}", ["is a folder"])])
+@pytest.mark.parametrize(
+    ("target", "words"),
+    [("/proc/e.csv", ["/proc"]), ("{file}/e.csv", ["Not a directory"]), ("{folder}", ["is a folder"])],
+)
 def test_eval_into_places_that_cannot_be_written(run_gridlight, constant_file, tmp_path, target, words):
     (tmp_path / "p.csv").write_text("x,y,z,nx,ny,nz\n0,0,0,0,0,1\n")
     target = target.format(file=tmp_path / "p.csv", folder=tmp_path)
@@ -231,39 +262,79 @@ def test_eval_into_places_that_cannot_be_written(run_gridlight, constant_file, t
 def test_eval_on_a_full_disk(constant_file, tmp_path, root):
     """A limit on the size of files stands for the disk: writing beyond it fails the same way."""
     (tmp_path / "p.csv").write_text("x,y,z,nx,ny,nz\n" + "0,0,0,0,0,1\n" * 2000)
-    program = ("import resource, runpy, signal, sys\n"
-               "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-               "resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))\n"
-               f"sys.argv = ['gridlight', *sys.argv[1:]]; runpy.run_path({str(root / 'cli' / '__main__.py')!r}, "
-               "run_name='__main__')\n")
+    program = (
+        "import resource, runpy, signal, sys\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))\n"
+        f"sys.argv = ['gridlight', *sys.argv[1:]]; runpy.run_path({str(root / 'cli' / '__main__.py')!r}, "
+        "run_name='__main__')\n"
+    )
     out = tmp_path / "out"
-    done = subprocess.run([sys.executable, "-I", "-c", program, "eval", constant_file, "--points", tmp_path / "p.csv", "-o",
-                           out / "e.csv"], capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-I",
+            "-c",
+            program,
+            "eval",
+            constant_file,
+            "--points",
+            tmp_path / "p.csv",
+            "-o",
+            out / "e.csv",
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
     assert_one_line(done, 2, "cannot write", "too large")
     assert not out.exists()
 
 
-# --- pipes -------------------------------------------------------------------------------------------------------------
+# --- pipes
+# -------------------------------------------------------------------------------------------------------------
 
 
 def test_a_reader_that_leaves_gets_no_traceback(constant_file, root):
     read_end, write_end = os.pipe()
     os.close(read_end)
-    done = subprocess.run([sys.executable, "-I", str(root / "cli" / "__main__.py"), "info", str(constant_file)],
-                          stdout=write_end, stderr=subprocess.PIPE, text=True, check=False, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-I", str(root / "cli" / "__main__.py"), "info", str(constant_file)],
+        stdout=write_end,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+        timeout=60,
+    )
     os.close(write_end)
     assert done.returncode == 0 and done.stderr == ""
 
 
-# --- interrupts --------------------------------------------------------------------------------------------------------
+# --- interrupts
+# --------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("delay", [0.15, 0.2, 0.3, 0.5, 0.8])
 def test_an_interrupt_at_any_time_ends_eval_without_traceback(constant_file, tmp_path, root, delay):
     points, out = tmp_path / "p.csv", tmp_path / "out"
     points.write_text("x,y,z,nx,ny,nz\n" + "0,0,0,0,0,1\n" * 400_000)
-    process = subprocess.Popen([sys.executable, "-I", root / "cli" / "__main__.py", "eval", constant_file, "--points", points,
-                                "-o", out / "e.csv"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [
+            sys.executable,
+            "-I",
+            root / "cli" / "__main__.py",
+            "eval",
+            constant_file,
+            "--points",
+            points,
+            "-o",
+            out / "e.csv",
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
     time.sleep(delay)
     process.send_signal(signal.SIGINT)
     output, errors = process.communicate(timeout=60)

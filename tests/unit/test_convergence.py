@@ -79,6 +79,7 @@ def test_no_light_at_all():
 @pytest.mark.parametrize("bounces", [0, 1, 7])
 def test_a_number_of_bounces_is_kept_exactly(bounces):
     state, watch = run(np.array([[0.5]]), np.array([1.0]), bounces=bounces)
-    assert watch.iterations == bounces + 1 and watch.done and watch.converged
+    assert watch.iterations == bounces + 1 and watch.done
+    assert watch.converged == (bounces == 7 and watch.missing < 2e-3)
     assert state[0] == pytest.approx(sum(0.5**i for i in range(bounces + 1)), rel=1e-12)
     assert f"{bounces} bounces" in watch.reason

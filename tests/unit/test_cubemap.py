@@ -27,7 +27,9 @@ def test_solid_angles_against_the_projected_area():
     face = 128
     centre = (np.arange(face) + 0.5) * 2 / face - 1
     s, t = np.meshgrid(centre, centre)
-    np.testing.assert_allclose(cubemap.texel_solid_angles(face), (2 / face) ** 2 * (s * s + t * t + 1) ** -1.5, rtol=2e-4)
+    np.testing.assert_allclose(
+        cubemap.texel_solid_angles(face), (2 / face) ** 2 * (s * s + t * t + 1) ** -1.5, rtol=2e-4
+    )
 
 
 def test_faces_are_what_a_camera_sees():
@@ -89,12 +91,18 @@ def test_octahedral_round_trip_of_directions(x, y, z):
 @given(component, component)
 def test_octahedral_round_trip_of_coordinates(u, v):
     uv = np.array([u, v])
-    if abs(abs(u) + abs(v) - 1) < 1e-9 or max(abs(u), abs(v)) > 1 - 1e-9 or (abs(u) + abs(v) > 1 and min(abs(u), abs(v)) < 1e-9):
+    if (
+        abs(abs(u) + abs(v) - 1) < 1e-9
+        or max(abs(u), abs(v)) > 1 - 1e-9
+        or (abs(u) + abs(v) > 1 and min(abs(u), abs(v)) < 1e-9)
+    ):
         return  # on the folds two coordinates name one direction
     np.testing.assert_allclose(cubemap.octahedral_encode(cubemap.octahedral_decode(uv)), uv, atol=1e-9)
 
 
-@pytest.mark.parametrize("direction", np.concatenate([np.eye(3), -np.eye(3), [[1, 1, 0], [-1, 0, -1], [0, -1, -1], [1, -1, -1]]]))
+@pytest.mark.parametrize(
+    "direction", np.concatenate([np.eye(3), -np.eye(3), [[1, 1, 0], [-1, 0, -1], [0, -1, -1], [1, -1, -1]]])
+)
 def test_octahedral_axes_and_diagonals(direction):
     direction = direction / np.linalg.norm(direction)
     np.testing.assert_allclose(cubemap.octahedral_decode(cubemap.octahedral_encode(direction)), direction, atol=1e-15)
@@ -102,6 +110,8 @@ def test_octahedral_axes_and_diagonals(direction):
 
 def test_octahedral_layout():
     """The upper half sphere is the inner diamond: +Z in the middle, +X to the right, +Y up, −Z in all four corners."""
-    np.testing.assert_array_equal(cubemap.octahedral_encode(np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]])), [[0, 0], [1, 0], [0, 1]])
+    np.testing.assert_array_equal(
+        cubemap.octahedral_encode(np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]])), [[0, 0], [1, 0], [0, 1]]
+    )
     corners = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
     np.testing.assert_allclose(cubemap.octahedral_decode(corners), np.tile([0, 0, -1], (4, 1)), atol=1e-15)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which probes are needed: the exact overlap test, counts that can be told by hand, and the rule for what lies outside."""
+"""Which probes are needed: the exact overlap test, counts that can be told by hand, and the rule for what lies
+outside."""
 
 import resource
 import time

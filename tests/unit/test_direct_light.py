@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Direct light against closed forms, kind by kind. The surface is the plane z = 0 with its normal up unless said otherwise."""
+"""Direct light against closed forms, kind by kind. The surface is the plane z = 0 with its normal up unless said
+otherwise."""
 
 import numpy as np
 import pytest
@@ -48,7 +49,8 @@ def test_light_below_the_horizon_gives_nothing():
 
 @pytest.mark.parametrize("radius", [0.1, 0.5, 1.5])
 def test_sphere_light_is_as_bright_as_its_centre(radius):
-    """A sphere wholly above the horizon gives what its intensity at the centre would, for any radius: E = I cos θ / d²."""
+    """A sphere wholly above the horizon gives what its intensity at the centre would, for any radius: E = I cos θ /
+    d²."""
     lamp = light("POINT", radius=radius, soft_falloff=False)
     np.testing.assert_allclose(irradiance(lamp), COLOR / 4, rtol=2e-3)
     np.testing.assert_allclose(irradiance(lamp, (1, 0, 0)), COLOR * 2 / 5**1.5, rtol=5e-3)
@@ -87,7 +89,9 @@ def test_spot_is_a_masked_point_light():
 
 def test_hard_spot():
     lamp = light("SPOT", spot_size=np.radians(60), spot_blend=0.0)
-    np.testing.assert_allclose(irradiance(lamp, (2 * np.tan(np.radians(29.9)), 0, 0)), COLOR * np.cos(np.radians(29.9)) ** 3 / 4, rtol=1e-6)
+    np.testing.assert_allclose(
+        irradiance(lamp, (2 * np.tan(np.radians(29.9)), 0, 0)), COLOR * np.cos(np.radians(29.9)) ** 3 / 4, rtol=1e-6
+    )
     assert not irradiance(lamp, (2 * np.tan(np.radians(30.1)), 0, 0)).any()
 
 
@@ -128,7 +132,8 @@ def test_area_lights_shine_forward_only():
 
 @pytest.mark.parametrize("spread", [0.3, 1.0, 2.0, 3.0])
 def test_spread_keeps_the_power(spread):
-    """∫ attenuation · cos θ dω over the half sphere is π, as without spread; beyond half the spread there is nothing."""
+    """∫ attenuation · cos θ dω over the half sphere is π, as without spread; beyond half the spread there is
+    nothing."""
     lamp = light("AREA", position=(0, 0, 0), size_x=1e-3, size_y=1e-3, spread=spread)
     theta = (np.arange(4000) + 0.5) * (np.pi / 2) / 4000
     points = 10 * np.stack([np.sin(theta), 0 * theta, -np.cos(theta)], 1)

@@ -65,8 +65,15 @@ def test_resolution_out_of_range(resolution):
         Grid.from_bounds([0] * 3, [1] * 3, resolution)
 
 
-@pytest.mark.parametrize("low,high,word", [([0, 0, 0], [1, 0, 1], "along Y"), ([0, 0, 0], [-1, 1, 1], "along X"),
-                                           ([0, 0, np.nan], [1, 1, 1], "finite"), ([0, 0, 0], [1, 1, np.inf], "finite")])
+@pytest.mark.parametrize(
+    "low,high,word",
+    [
+        ([0, 0, 0], [1, 0, 1], "along Y"),
+        ([0, 0, 0], [-1, 1, 1], "along X"),
+        ([0, 0, np.nan], [1, 1, 1], "finite"),
+        ([0, 0, 0], [1, 1, np.inf], "finite"),
+    ],
+)
 def test_bad_bounds(low, high, word):
     with pytest.raises(InputError, match=word):
         Grid.from_bounds(low, high, (2, 2, 2))

@@ -28,7 +28,9 @@ def test_bilinear_between_centres():
     np.testing.assert_allclose(sample(ramp(), [0.5, 0.5])[0, :2], [1.5, 0.5])
 
 
-@pytest.mark.parametrize("extension,expected", [("REPEAT", [3, 0]), ("EXTEND", [0, 3]), ("MIRROR", [0, 3]), ("CLIP", [0, 0])])
+@pytest.mark.parametrize(
+    "extension,expected", [("REPEAT", [3, 0]), ("EXTEND", [0, 3]), ("MIRROR", [0, 3]), ("CLIP", [0, 0])]
+)
 def test_past_the_edge(extension, expected):
     found = sample(ramp(extension=extension), [[-0.125, 0.25], [1.125, 0.25]])
     np.testing.assert_allclose(found[:, 0], expected)

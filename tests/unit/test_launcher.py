@@ -36,8 +36,15 @@ def checkout(tmp_path):
 def launch(checkout, *arguments, command=None, **environment):
     variables = {**os.environ, "GRIDLIGHT_PYTHON": PYTHON, **environment}
     variables = {name: value for name, value in variables.items() if value is not None}
-    return subprocess.run([command or checkout / "gridlight", *arguments], env=variables, capture_output=True, text=True,
-                          check=False, timeout=120, stdin=subprocess.DEVNULL)
+    return subprocess.run(
+        [command or checkout / "gridlight", *arguments],
+        env=variables,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+        stdin=subprocess.DEVNULL,
+    )
 
 
 def test_first_call_makes_the_environment_and_the_next_uses_it(checkout, tmp_path):
@@ -91,8 +98,12 @@ def test_a_stale_lock_does_not_block(checkout):
 
 def test_two_first_calls_at_once(checkout):
     variables = {**os.environ, "GRIDLIGHT_PYTHON": PYTHON}
-    both = [subprocess.Popen([checkout / "gridlight"], env=variables, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
-            for _ in range(2)]
+    both = [
+        subprocess.Popen(
+            [checkout / "gridlight"], env=variables, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True
+        )
+        for _ in range(2)
+    ]
     errors = [process.communicate(timeout=120)[1] for process in both]
     assert [process.returncode for process in both] == [7, 7]
     assert sum("making" in text for text in errors) == 1 and sum("waiting" in text for text in errors) == 1
@@ -121,8 +132,15 @@ def test_a_shim_that_fails_is_passed_over(checkout, tmp_path):
     home = tmp_path / "home"
     (home / ".pyenv" / "versions" / f"{VERSION}.99" / "bin").mkdir(parents=True)
     (home / ".pyenv" / "versions" / f"{VERSION}.99" / "bin" / "python").symlink_to(PYTHON)
-    done = launch(checkout, "--environment", SERIES, GRIDLIGHT_PYTHON=None, PATH=f"{shims}:/usr/bin:/bin", HOME=str(home),
-                  PYENV_ROOT=None)
+    done = launch(
+        checkout,
+        "--environment",
+        SERIES,
+        GRIDLIGHT_PYTHON=None,
+        PATH=f"{shims}:/usr/bin:/bin",
+        HOME=str(home),
+        PYENV_ROOT=None,
+    )
     assert done.returncode == 0, done.stderr
     assert done.stdout == f"{checkout / '.venv' / 'bin' / 'python'}\n"
 
@@ -140,8 +158,14 @@ def test_no_python_at_all(checkout, tmp_path):
 def test_ctrl_c_during_the_installation_leaves_no_lock(checkout):
     for pins in (checkout / "requirements").glob("bpy*.txt"):
         pins.write_text("pip\n")
-    process = subprocess.Popen([checkout / "gridlight"], env={**os.environ, "GRIDLIGHT_PYTHON": PYTHON}, text=True,
-                               stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, start_new_session=True)
+    process = subprocess.Popen(
+        [checkout / "gridlight"],
+        env={**os.environ, "GRIDLIGHT_PYTHON": PYTHON},
+        text=True,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        start_new_session=True,
+    )
     for _ in range(100):
         if (checkout / ".venv").exists():
             break

@@ -22,7 +22,9 @@ def open_field(resolution=(4, 3, 3), matrix=None, bands=3):
 def points_and_normals(count=200, reach=1.0, seed=0):
     generator = np.random.default_rng(seed)
     normals = generator.normal(size=(count, 3))
-    return generator.uniform(-reach, reach, (count, 3)) * [3, 2, 2], normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    return generator.uniform(-reach, reach, (count, 3)) * [3, 2, 2], normals / np.linalg.norm(
+        normals, axis=1, keepdims=True
+    )
 
 
 def depth_of(distance_along):
@@ -37,7 +39,9 @@ def test_uniform_light_is_uniform_everywhere():
     field = open_field()
     field.coefficients[:, 0] = np.array([1, 2, 3]) * np.sqrt(4 * np.pi)
     points, normals = points_and_normals(reach=3.0)
-    np.testing.assert_allclose(lookup.irradiance(field, points, normals), np.tile(np.pi * np.array([1, 2, 3]), (200, 1)), rtol=1e-6)
+    np.testing.assert_allclose(
+        lookup.irradiance(field, points, normals), np.tile(np.pi * np.array([1, 2, 3]), (200, 1)), rtol=1e-6
+    )
 
 
 def test_at_a_node_the_field_is_the_nodes():
@@ -78,7 +82,9 @@ def test_outside_the_box_the_nearest_face_counts():
     field.coefficients[:] = np.random.default_rng(3).random(field.coefficients.shape)
     points, normals = points_and_normals(100, 4.0)
     clamped = np.clip(points, [-3, -2, -2], [3, 2, 2])
-    np.testing.assert_allclose(lookup.irradiance(field, points, normals), lookup.irradiance(field, clamped, normals), rtol=1e-5)
+    np.testing.assert_allclose(
+        lookup.irradiance(field, points, normals), lookup.irradiance(field, clamped, normals), rtol=1e-5
+    )
 
 
 @pytest.mark.parametrize("resolution", [(1, 1, 1), (1, 3, 1), (2, 1, 4)])
@@ -94,7 +100,11 @@ def test_a_probe_behind_a_wall_does_not_leak():
     field = open_field((2, 1, 1), np.diag([1.0, 1, 1, 1]))
     field.coefficients[1, 0] = 100
     for node, side in ((0, 1), (1, -1)):
-        field.depth[node] = depth_of(lambda d, side=side: np.where(d[:, 0] * side > 1e-3, np.minimum(1 / np.maximum(d[:, 0] * side, 1e-3), 4), 4.0))
+        field.depth[node] = depth_of(
+            lambda d, side=side: np.where(
+                d[:, 0] * side > 1e-3, np.minimum(1 / np.maximum(d[:, 0] * side, 1e-3), 4), 4.0
+            )
+        )
     left = np.array([[-0.05, 0, 0], [-0.3, 0.2, 0.1]])
     found = lookup.irradiance(field, left, np.tile([-1.0, 0, 0], (2, 1)))
     assert (found < 0.05 * 100).all(), "less than a twentieth of what open space would show"

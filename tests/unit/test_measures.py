@@ -48,8 +48,10 @@ def test_noise_of_mean_of_two_renders():
     assert measures.noise_of_mean(first, second) == pytest.approx(mean_error, rel=0.02)
 
 
-@pytest.mark.parametrize("measured, reference", [
-    (np.zeros((2, 3)), np.zeros((3, 3))), (np.zeros((0, 3)), np.zeros((0, 3))), (np.ones((2, 3)), np.zeros((2, 3)))])
+@pytest.mark.parametrize(
+    "measured, reference",
+    [(np.zeros((2, 3)), np.zeros((3, 3))), (np.zeros((0, 3)), np.zeros((0, 3))), (np.ones((2, 3)), np.zeros((2, 3)))],
+)
 def test_what_cannot_be_compared_is_refused(measured, reference):
     with pytest.raises(ValueError):
         measures.compare(measured, reference)

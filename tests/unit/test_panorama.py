@@ -3,7 +3,6 @@
 
 import numpy as np
 import pytest
-
 from gridlight.core.panorama import (
     panorama_coordinates,
     panorama_directions,
@@ -56,7 +55,7 @@ def test_uniform_radiance(size):
 def test_projection_recovers_each_basis_function():
     values = basis(panorama_directions(256, 128), 3)
     for index in range(9):
-        coefficients = project_panorama(np.repeat(values[..., index:index + 1], 3, axis=2), 3)
+        coefficients = project_panorama(np.repeat(values[..., index : index + 1], 3, axis=2), 3)
         assert np.allclose(coefficients[:, 0], np.eye(9)[index], atol=1e-3)
 
 

@@ -21,10 +21,15 @@ def random_field(resolution=(3, 4, 2), bands=3, seed=0) -> Field:
     matrix[:3] = rng.normal(size=(3, 4))
     grid = Grid(matrix, resolution, "Volume “A”")
     count = grid.count
-    return Field(grid, rng.normal(size=(count, bands * bands, 3)).astype(np.float32), rng.integers(0, 3, count).astype(np.uint8),
-                 rng.random(count, np.float32), rng.normal(size=(count, 3)).astype(np.float32),
-                 rng.random((count, DEPTH_EDGE**2, 2), np.float32),
-                 {"device": "test", "settings": {"bands": bands}, "scene_hash": "0", "warnings": ["one"]})
+    return Field(
+        grid,
+        rng.normal(size=(count, bands * bands, 3)).astype(np.float32),
+        rng.integers(0, 3, count).astype(np.uint8),
+        rng.random(count, np.float32),
+        rng.normal(size=(count, 3)).astype(np.float32),
+        rng.random((count, DEPTH_EDGE**2, 2), np.float32),
+        {"device": "test", "settings": {"bands": bands}, "scene_hash": "0", "warnings": ["one"]},
+    )
 
 
 @pytest.fixture
@@ -65,7 +70,9 @@ def test_layout_for_other_readers(written):
     nx, ny, nz = field.grid.resolution
     channels = file.channels()
     expected = {f"{name}.{color}" for name in coefficient_names(3) for color in "RGB"} | {"state", "validity"}
-    expected |= {f"offset.{axis}" for axis in "XYZ"} | {f"depth.{s}.{t:02d}" for s in ("mean", "meansq") for t in range(64)}
+    expected |= {f"offset.{axis}" for axis in "XYZ"} | {
+        f"depth.{s}.{t:02d}" for s in ("mean", "meansq") for t in range(64)
+    }
     assert set(channels) == expected
     for i, j, k in [(0, 0, 0), (2, 1, 0), (1, 3, 1), (2, 3, 1)]:
         flat = i + nx * (j + ny * k)
@@ -105,30 +112,34 @@ def set_key(*keys, value):
         for key in keys[:-1]:
             inner = inner[key]
         inner[keys[-1]] = value
+
     return change
 
 
-@pytest.mark.parametrize(("change", "words"), [
-    (set_key("format_version", value=[2, 0]), "format version 2.0"),
-    (set_key("format_version", value="1.0"), "format version is missing"),
-    (set_key("resolution", value=[3, 4, 3]), "pixels for a resolution"),
-    (set_key("resolution", value=[4, 3, 2]), "pixels for a resolution"),
-    (set_key("resolution", value=[0, 4, 2]), "1 to 256"),
-    (set_key("resolution", value=[3, 4]), "make no sense"),
-    (set_key("resolution", value=[3.0, 4, 2]), "make no sense"),
-    (set_key("resolution", value=[256, 256, 256]), "MiB"),
-    (set_key("bands", value=4), "channel L3m3.R is missing"),
-    (set_key("bands", value=10**9), "make no sense"),
-    (set_key("bands", value=True), "make no sense"),
-    (set_key("volume", value={}), "incomplete"),
-    (set_key("volume", "matrix", value=[[1, 0], [0, 1]]), "make no sense"),
-    (set_key("volume", "matrix", value=[["a"] * 4] * 4), "incomplete"),
-    (set_key("volume", "matrix", value=[[0] * 4] * 4), "no volume|zero size"),
-    (set_key("volume", "matrix", value=[[float("nan")] * 4] * 4), "not finite"),
-    (lambda document: "{", "not JSON"),
-    (lambda document: "[1]", "not a JSON object"),
-    (lambda document: "[" * 100_000, "not JSON|damaged"),
-])
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (set_key("format_version", value=[2, 0]), "format version 2.0"),
+        (set_key("format_version", value="1.0"), "format version is missing"),
+        (set_key("resolution", value=[3, 4, 3]), "pixels for a resolution"),
+        (set_key("resolution", value=[4, 3, 2]), "pixels for a resolution"),
+        (set_key("resolution", value=[0, 4, 2]), "1 to 256"),
+        (set_key("resolution", value=[3, 4]), "make no sense"),
+        (set_key("resolution", value=[3.0, 4, 2]), "make no sense"),
+        (set_key("resolution", value=[256, 256, 256]), "MiB"),
+        (set_key("bands", value=4), "channel L3m3.R is missing"),
+        (set_key("bands", value=10**9), "make no sense"),
+        (set_key("bands", value=True), "make no sense"),
+        (set_key("volume", value={}), "incomplete"),
+        (set_key("volume", "matrix", value=[[1, 0], [0, 1]]), "make no sense"),
+        (set_key("volume", "matrix", value=[["a"] * 4] * 4), "incomplete"),
+        (set_key("volume", "matrix", value=[[0] * 4] * 4), "no volume|zero size"),
+        (set_key("volume", "matrix", value=[[float("nan")] * 4] * 4), "not finite"),
+        (lambda document: "{", "not JSON"),
+        (lambda document: "[1]", "not a JSON object"),
+        (lambda document: "[" * 100_000, "not JSON|damaged"),
+    ],
+)
 def test_contradictions_in_the_description_are_refused(written, change, words):
     path, _field = written
     edited(path, change)
@@ -137,9 +148,16 @@ def test_contradictions_in_the_description_are_refused(written, change, words):
     assert "\n" not in str(caught.value) and str(path) in str(caught.value)
 
 
-@pytest.mark.parametrize(("name", "value", "words"), [
-    ("L00.R", np.nan, "L00.R holds values that are not finite"), ("depth.mean.63", np.inf, "depth.mean.63"),
-    ("state", 3, "states"), ("state", 0.5, "states"), ("validity", None, "validity is missing")])
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("L00.R", np.nan, "L00.R holds values that are not finite"),
+        ("depth.mean.63", np.inf, "depth.mean.63"),
+        ("state", 3, "states"),
+        ("state", 0.5, "states"),
+        ("validity", None, "validity is missing"),
+    ],
+)
 def test_bad_pixels_are_refused(written, name, value, words):
     path, _field = written
 
@@ -183,7 +201,8 @@ def test_every_truncation_is_refused_with_one_line(written, capfd):
 
 
 def test_no_flipped_bit_goes_unnoticed_in_the_numbers(written):
-    """Either the file is refused or everything in it is still right (a bit in the file's padding or names of no use)."""
+    """Either the file is refused or everything in it is still right (a bit in the file's padding or names of no
+    use)."""
     path, field = written
     data = path.read_bytes()
     rng = np.random.default_rng(1)

@@ -24,8 +24,19 @@ def room(material, lights=(), world=World(), images=(), half=1.0, inward=False):
     normal = np.cross(edge[:, 0], edge[:, 1])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     zeros = np.zeros(12, np.int32)
-    return SceneSnapshot(corners, triangles, np.repeat(normal[:, None], 3, axis=1).astype(np.float32), uvs.astype(np.float32),
-                         zeros, zeros, ["room"], [material], list(images), list(lights), world)
+    return SceneSnapshot(
+        corners,
+        triangles,
+        np.repeat(normal[:, None], 3, axis=1).astype(np.float32),
+        uvs.astype(np.float32),
+        zeros,
+        zeros,
+        ["room"],
+        [material],
+        list(images),
+        list(lights),
+        world,
+    )
 
 
 def irradiance_at_nodes(field):
@@ -71,7 +82,9 @@ def test_a_point_light_in_a_room_by_hand():
     to_light = position - points
     distance = np.linalg.norm(to_light, axis=2)
     expected = np.einsum("pxi,pxi->px", to_light, normals) / distance**3
-    np.testing.assert_allclose(job.source(surfaces), expected[..., None] * np.array([0.5, 0.25, 2.0]) / np.pi, rtol=1e-6)
+    np.testing.assert_allclose(
+        job.source(surfaces), expected[..., None] * np.array([0.5, 0.25, 2.0]) / np.pi, rtol=1e-6
+    )
     np.testing.assert_allclose(surfaces.normal, normals, atol=1e-7)
 
 
@@ -85,19 +98,30 @@ def test_textures_holes_and_emission():
 
     hole = np.ones((2, 2, 4), np.float32)
     hole[..., 3] = 0
-    open_room = room(Material("m", alpha_image=0, alpha_threshold=0.5), images=[Image("i", hole)], world=World((1, 2, 3)))
+    open_room = room(
+        Material("m", alpha_image=0, alpha_threshold=0.5), images=[Image("i", hole)], world=World((1, 2, 3))
+    )
     surfaces = ReferenceBake(open_room, GRID, BakeSettings(face=6)).capture()
     assert (surfaces.triangle == -1).all() and (surfaces.emission == [1, 2, 3]).all()
 
 
 def test_probes_in_a_solid_are_invalid():
-    """A small box in a room: the room's inward faces are seen by all, the box from outside by most and from inside by one."""
+    """A small box in a room: the room's inward faces are seen by all, the box from outside by most and from inside by
+    one."""
     outer, inner = room(Material("m"), inward=True), room(Material("m"), half=0.3)
     both = SceneSnapshot(
-        np.concatenate([outer.vertices, inner.vertices]), np.concatenate([outer.triangles, inner.triangles + 8]),
-        np.concatenate([outer.corner_normals, inner.corner_normals]), np.concatenate([outer.corner_uvs, inner.corner_uvs]),
-        np.zeros(24, np.int32), np.repeat([0, 1], 12).astype(np.int32), ["room", "box"], [Material("m")], [],
-        [Light("lamp", "POINT", (1.0, 1.0, 1.0), np.eye(4) + np.outer([0.5, 0.6, 0.7, 0], [0, 0, 0, 1]))], World())
+        np.concatenate([outer.vertices, inner.vertices]),
+        np.concatenate([outer.triangles, inner.triangles + 8]),
+        np.concatenate([outer.corner_normals, inner.corner_normals]),
+        np.concatenate([outer.corner_uvs, inner.corner_uvs]),
+        np.zeros(24, np.int32),
+        np.repeat([0, 1], 12).astype(np.int32),
+        ["room", "box"],
+        [Material("m")],
+        [],
+        [Light("lamp", "POINT", (1.0, 1.0, 1.0), np.eye(4) + np.outer([0.5, 0.6, 0.7, 0], [0, 0, 0, 1]))],
+        World(),
+    )
     grid = Grid.from_bounds([-0.8] * 3, [0.8] * 3, (3, 3, 3))
     job = ReferenceBake(both, grid, BakeSettings(face=8))
     surfaces = job.capture()

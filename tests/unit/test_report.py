@@ -10,7 +10,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from gridlight.core.conventions import ACTIVE, CULLED, INVALID
+from gridlight.core.conventions import CULLED, INVALID
 from gridlight.core.field import Field
 from gridlight.core.grid import Grid
 from gridlight.formats import report_figures, report_slices
@@ -27,10 +27,21 @@ def a_field(resolution=(4, 3, 2), name="Hall") -> Field:
 
 
 def a_report(**changes) -> ReportData:
-    volume = VolumeReport(a_field(), "Hall", [1.0, 1.5, 1.6, 1.61], [0.5, 0.07, 0.006], 4, True, ["raster, because it is cheap"])
-    values = dict(title="Gallery", volumes=[volume], settings={"tolerance": 2e-3}, device="llvmpipe", blender="5.2.3",
-                  counts={"total": 24, "active": 22, "culled": 1, "invalid": 1}, seconds={"read": 0.1, "light": 1.5, "total": 1.7},
-                  notes=["trace: 24 probes"], warnings=["hair is left out"], summary={"iterations": 4})
+    volume = VolumeReport(
+        a_field(), "Hall", [1.0, 1.5, 1.6, 1.61], [0.5, 0.07, 0.006], 4, True, ["raster, because it is cheap"]
+    )
+    values = dict(
+        title="Gallery",
+        volumes=[volume],
+        settings={"tolerance": 2e-3},
+        device="llvmpipe",
+        blender="5.2.3",
+        counts={"total": 24, "active": 22, "culled": 1, "invalid": 1},
+        seconds={"read": 0.1, "light": 1.5, "total": 1.7},
+        notes=["trace: 24 probes"],
+        warnings=["hair is left out"],
+        summary={"iterations": 4},
+    )
     return ReportData(**{**values, **changes})
 
 
@@ -67,15 +78,33 @@ def test_a_page_is_well_formed_and_loads_nothing():
         for name in ("src", "href"):
             assert attributes.get(name, "data:").startswith(("data:", "#")), (tag, attributes)
     assert not re.search(r"https?://|@import|url\((?!data:)", text)
-    for expected in ("Hall", "llvmpipe", "5.2.3", "hair is left out", "trace: 24 probes", "raster, because it is cheap", "1.5"):
+    for expected in (
+        "Hall",
+        "llvmpipe",
+        "5.2.3",
+        "hair is left out",
+        "trace: 24 probes",
+        "raster, because it is cheap",
+        "1.5",
+    ):
         assert expected in text
 
 
 def test_nothing_from_the_file_becomes_markup():
     field = a_field(name=EVIL)
-    report = a_report(title=EVIL, volumes=[VolumeReport(field, EVIL, [1.0], [], 1, False, [EVIL])], settings={EVIL: EVIL}, device=EVIL,
-                      blender=EVIL, generator=EVIL, seconds={EVIL: 1.0}, notes=[EVIL], warnings=[EVIL], images=[(EVIL, b"")],
-                      summary={EVIL: [EVIL]})
+    report = a_report(
+        title=EVIL,
+        volumes=[VolumeReport(field, EVIL, [1.0], [], 1, False, [EVIL])],
+        settings={EVIL: EVIL},
+        device=EVIL,
+        blender=EVIL,
+        generator=EVIL,
+        seconds={EVIL: 1.0},
+        notes=[EVIL],
+        warnings=[EVIL],
+        images=[(EVIL, b"")],
+        summary={EVIL: [EVIL]},
+    )
     text = report_html(report)
     page = Page(text)
     assert page.stack == [] and page.count("script") == 1
@@ -90,11 +119,16 @@ def test_only_the_pages_own_script_may_run():
     assert f"script-src 'sha256-{digest}'" in text and "default-src 'none'" in text
 
 
-@pytest.mark.parametrize("volume", [
-    VolumeReport(a_field((1, 1, 1))),
-    VolumeReport(Field.empty(Grid.from_bounds((0, 0, 0), (1, 1, 1), (2, 2, 2)), 1), energy=[0.0, 0.0], change=[0.0]),
-    VolumeReport(a_field((3, 3, 40)), energy=[1.0, float("nan")], change=[float("inf")]),
-])
+@pytest.mark.parametrize(
+    "volume",
+    [
+        VolumeReport(a_field((1, 1, 1))),
+        VolumeReport(
+            Field.empty(Grid.from_bounds((0, 0, 0), (1, 1, 1), (2, 2, 2)), 1), energy=[0.0, 0.0], change=[0.0]
+        ),
+        VolumeReport(a_field((3, 3, 40)), energy=[1.0, float("nan")], change=[float("inf")]),
+    ],
+)
 def test_odd_fields_still_make_a_page(volume):
     with np.errstate(all="raise"):
         assert Page(report_html(a_report(volumes=[volume]))).stack == []
@@ -127,9 +161,9 @@ def decode_png(data: bytes) -> np.ndarray:
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     at, chunks = 8, {}
     while at < len(data):
-        (length,) = struct.unpack(">I", data[at:at + 4])
-        kind, body = data[at + 4:at + 8], data[at + 8:at + 8 + length]
-        assert struct.unpack(">I", data[at + 8 + length:at + 12 + length])[0] == zlib.crc32(kind + body)
+        (length,) = struct.unpack(">I", data[at : at + 4])
+        kind, body = data[at + 4 : at + 8], data[at + 8 : at + 8 + length]
+        assert struct.unpack(">I", data[at + 8 + length : at + 12 + length])[0] == zlib.crc32(kind + body)
         chunks[kind] = body
         at += 12 + length
     width, height, depth, colour = struct.unpack(">IIBB", chunks[b"IHDR"][:10])
@@ -147,8 +181,10 @@ def test_png_round_trip():
 def test_slices_show_each_probe_in_its_place():
     field = a_field()
     html = report_slices.slices_html(field, "v")
-    atlases = {key: decode_png(base64.b64decode(data)) for key, data in
-               re.findall(r'data-key="(\w+)" style="--atlas:url\(data:image/png;base64,([^)]*)\)', html)}
+    atlases = {
+        key: decode_png(base64.b64decode(data))
+        for key, data in re.findall(r'data-key="(\w+)" style="--atlas:url\(data:image/png;base64,([^)]*)\)', html)
+    }
     assert set(atlases) == {"up", "mean", "colour", "state"}
     # Nodes 1 and 2 stand in the lowest level at j = 0: the bottom row of the first of two blocks of three rows.
     for atlas in atlases.values():
@@ -174,7 +210,9 @@ def test_numbers(value, text):
     assert report_figures.number(value) == text
 
 
-@pytest.mark.parametrize(("seconds", "text"), [(5e-5, "50 µs"), (0.0123, "12.3 ms"), (3.456, "3.46 s"), (600, "10.0 min")])
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(5e-5, "50 µs"), (0.0123, "12.3 ms"), (3.456, "3.46 s"), (600, "10.0 min")]
+)
 def test_durations(seconds, text):
     assert report_figures.duration(seconds) == text
 

@@ -42,11 +42,20 @@ def test_samples_of_one_key_are_stratified():
 
 
 def test_keys_of_probes_texels_lights_and_seeds_differ():
-    keys = np.concatenate([sampling.texel_keys(np.arange(3)[:, None], np.arange(4), sampling.light_stream(light), seed).reshape(-1, 3)
-                           for light in range(3) for seed in range(3)])
+    keys = np.concatenate(
+        [
+            sampling.texel_keys(np.arange(3)[:, None], np.arange(4), sampling.light_stream(light), seed).reshape(-1, 3)
+            for light in range(3)
+            for seed in range(3)
+        ]
+    )
     assert len(np.unique(keys, axis=0)) == 108
     assert len(np.unique(sampling.sample_r2(keys, 0), axis=0)) == 108
 
 
 def test_keys_wrap_like_unsigned_integers():
-    assert sampling.texel_keys(np.array(7), np.array(9), sampling.light_stream(3), 2**31 - 1).tolist() == [7, 9, (3 * 0x9E3779B9 + 2**31 - 1) % 2**32]
+    assert sampling.texel_keys(np.array(7), np.array(9), sampling.light_stream(3), 2**31 - 1).tolist() == [
+        7,
+        9,
+        (3 * 0x9E3779B9 + 2**31 - 1) % 2**32,
+    ]

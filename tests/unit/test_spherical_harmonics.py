@@ -31,7 +31,9 @@ def definition(l, m, directions):
     """Y_lm = √2 K cos(mφ) P_lm(z), sin(|m|φ) for m < 0, without the Condon-Shortley phase (−1)^m."""
     x, y, z = directions.T
     order = abs(m)
-    legendre = Legendre.basis(l).convert(kind=Polynomial).deriv(order) if order else Legendre.basis(l).convert(kind=Polynomial)
+    legendre = (
+        Legendre.basis(l).convert(kind=Polynomial).deriv(order) if order else Legendre.basis(l).convert(kind=Polynomial)
+    )
     associated = (1 - z * z) ** (order / 2) * legendre(z)
     norm = np.sqrt((2 * l + 1) / (4 * np.pi) * factorial(l - order) / factorial(l + order))
     angle = np.arctan2(y, x)
@@ -42,13 +44,31 @@ def definition(l, m, directions):
 @pytest.mark.parametrize("l,m", [(l, m) for l in range(BANDS) for m in range(-l, l + 1)])
 def test_every_function_is_its_definition(l, m):
     directions = random_directions(200)
-    np.testing.assert_allclose(sh.basis(directions, BANDS)[:, l * (l + 1) + m], definition(l, m, directions), atol=1e-13)
+    np.testing.assert_allclose(
+        sh.basis(directions, BANDS)[:, l * (l + 1) + m], definition(l, m, directions), atol=1e-13
+    )
 
 
-# A direction for every coefficient where it must be positive: written down by hand from the table in the architecture page.
-POSITIVE = {"L00": (0, 0, 1), "L1m1": (0, 1, 0), "L10": (0, 0, 1), "L11": (1, 0, 0), "L2m2": (1, 1, 0), "L2m1": (0, 1, 1),
-            "L20": (0, 0, 1), "L21": (1, 0, 1), "L22": (1, 0, 0), "L3m3": (1.732, 1, 0), "L3m2": (1, 1, 1), "L3m1": (0, 1, 2),
-            "L30": (0, 0, 1), "L31": (1, 0, 2), "L32": (1, 0, 1), "L33": (1, 0, 0)}
+# A direction for every coefficient where it must be positive: written down by hand from the table in the architecture
+# page.
+POSITIVE = {
+    "L00": (0, 0, 1),
+    "L1m1": (0, 1, 0),
+    "L10": (0, 0, 1),
+    "L11": (1, 0, 0),
+    "L2m2": (1, 1, 0),
+    "L2m1": (0, 1, 1),
+    "L20": (0, 0, 1),
+    "L21": (1, 0, 1),
+    "L22": (1, 0, 0),
+    "L3m3": (1.732, 1, 0),
+    "L3m2": (1, 1, 1),
+    "L3m1": (0, 1, 2),
+    "L30": (0, 0, 1),
+    "L31": (1, 0, 2),
+    "L32": (1, 0, 1),
+    "L33": (1, 0, 0),
+}
 
 
 def test_order_and_sign_of_every_coefficient():
@@ -83,7 +103,9 @@ def test_rotating_the_light_rotates_irradiance():
     coefficients = np.random.default_rng(4).normal(size=(BANDS**2, 3))
     turned = sh.project(sh.radiance(coefficients, directions @ rotation), directions, weights, BANDS)
     normals = random_directions(50)
-    np.testing.assert_allclose(sh.irradiance(turned, normals @ rotation.T), sh.irradiance(coefficients, normals), atol=1e-12)
+    np.testing.assert_allclose(
+        sh.irradiance(turned, normals @ rotation.T), sh.irradiance(coefficients, normals), atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("face", (4, 16, 64))
@@ -94,7 +116,8 @@ def test_uniform_radiance_gives_pi_times_it(face, bands):
     radiance = np.tile([0.5, 1.0, 7.0], (len(directions), 1))
     coefficients = sh.project(radiance, directions, weights, bands)
     expected = np.tile(np.pi * radiance[0], (20, 1))
-    # texels are points for the basis: band 2 does not integrate to zero exactly, the error falls with the square of the face
+    # texels are points for the basis: band 2 does not integrate to zero exactly, the error falls with the square of
+    # the face
     np.testing.assert_allclose(sh.irradiance(coefficients, random_directions(20)), expected, rtol=1e-12 + 0.5 / face**2)
     np.testing.assert_allclose(coefficients[0], radiance[0] * np.sqrt(4 * np.pi), rtol=1e-13)
 
