@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The result of ``bench peers`` as an SVG picture: error over time where errors were measured, else bars of time.
+
+Both time axes are logarithmic: the peers are orders of magnitude apart.
+"""
+
+from __future__ import annotations
+
+import math
+from html import escape
+
+from .bench_table import significant
+
+_WIDTH, _LEFT, _RIGHT, _TOP, _BOTTOM = 860, 70, 40, 44, 46
+_COLOURS = {"Gridlight": "#c2410c", "Cycles panoramas": "#1d4ed8", "EEVEE volume": "#15803d"}
+_GREY, _INK = "#d4d4d4", "#262626"
+
+
+def plot(summary: dict) -> str:
+    """SVG text of ``summary`` as ``bench_peers.run`` makes it."""
+    rows = [row for row in summary["rows"] if row["seconds"] is not None]
+    return _error_over_time(summary, rows) if summary["reference"] else _bars(summary, rows)
+
+
+def _name(row: dict) -> str:
+    return f"{row['peer']}, {row['setting']}" + (f", {row['run']}" if row["peer"] != "Cycles panoramas" else "")
+
+
+class _Scale:
+    """A logarithmic axis over whole decades from ``start`` to ``end`` in picture units."""
+
+    def __init__(self, values: list[float], start: float, end: float):
+        self.low = math.floor(math.log10(min(values)))
+        self.high = max(math.ceil(math.log10(max(values))), self.low + 1)
+        self._start, self._end = start, end
+
+    def __call__(self, value: float) -> float:
+        return self._start + (self._end - self._start) * (math.log10(value) - self.low) / (self.high - self.low)
+
+    def ticks(self) -> list[tuple[float, str]]:
+        """(value, label) at 1, 2 and 5 of every decade; only decades carry a label where there are many."""
+        ticks = [(step * 10.0**power, step) for power in range(self.low, self.high) for step in (1, 2, 5)]
+        ticks.append((10.0**self.high, 1))
+        few = self.high - self.low <= 3
+        return [(value, f"{value:g}" if few or step == 1 else "") for value, step in ticks]
+
+
+def _time_axis(scale: _Scale, top: float, bottom: float) -> list[str]:
+    parts = []
+    for value, label in scale.ticks():
+        at = scale(value)
+        parts.append(f'<line x1="{at:.1f}" x2="{at:.1f}" y1="{top}" y2="{bottom}" stroke="{_GREY}"/>'
+                     f'<text x="{at:.1f}" y="{bottom + 17}" text-anchor="middle">{label}</text>')
+    middle = (scale(10.0**scale.low) + scale(10.0**scale.high)) / 2
+    parts.append(f'<text x="{middle:.1f}" y="{bottom + 36}" text-anchor="middle">seconds</text>')
+    return parts
+
+
+def _bars(summary: dict, rows: list[dict]) -> str:
+    names_end = 310
+    height = _TOP + 28 * len(rows) + _BOTTOM
+    scale = _Scale([row["seconds"] for row in rows], names_end, _WIDTH - 80)
+    bottom = height - _BOTTOM
+    parts = _time_axis(scale, _TOP, bottom)
+    for index, row in enumerate(rows):
+        top = _TOP + 28 * index + 5
+        end = scale(row["seconds"])
+        parts.append(f'<text x="{names_end - 8}" y="{top + 14}" text-anchor="end">{escape(_name(row))}</text>'
+                     f'<rect x="{names_end}" y="{top}" width="{max(end - names_end, 1):.1f}" height="19" fill="{_COLOURS[row["peer"]]}"/>'
+                     f'<text x="{end + 6:.1f}" y="{top + 14}">{significant(row["seconds"])} s</text>')
+    return _page(summary, height, "time to light all locations", parts)
+
+
+def _error_over_time(summary: dict, rows: list[dict]) -> str:
+    height = 520
+    bottom = height - _BOTTOM
+    reference = summary["reference"]
+    floor = 100 * reference["floor"]["relative_rms"]
+    errors = [100 * row["error"]["relative_rms"] for row in rows if row["error"]]
+    across = _Scale([row["seconds"] for row in rows], _LEFT, _WIDTH - _RIGHT)
+    up = _Scale([value for value in [*errors, floor] if value > 0], bottom, _TOP)
+    parts = _time_axis(across, _TOP, bottom)
+    for value, label in up.ticks():
+        parts.append(f'<line x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{up(value):.1f}" y2="{up(value):.1f}" stroke="{_GREY}"/>'
+                     f'<text x="{_LEFT - 8}" y="{up(value) + 4:.1f}" text-anchor="end">{label}</text>')
+    parts.append(f'<text transform="translate(18 {(_TOP + bottom) / 2}) rotate(-90)" text-anchor="middle">error, % relative RMS</text>')
+    if floor > 0:
+        parts.append(f'<line x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{up(floor):.1f}" y2="{up(floor):.1f}" stroke="{_INK}" '
+                     f'stroke-dasharray="2 4"/><text x="{_WIDTH - _RIGHT - 4}" y="{up(floor) - 6:.1f}" text-anchor="end">'
+                     f'floor of {reference["bands"]} bands</text>')
+    for row in rows:
+        x, colour, name = across(row["seconds"]), _COLOURS[row["peer"]], escape(_name(row))
+        if row["error"]:
+            y = up(100 * row["error"]["relative_rms"])
+            parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="6" fill="{colour}"/>{_label(x, y - 11, name)}')
+        else:  # its time is known, its error is not
+            parts.append(f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{_TOP}" y2="{bottom}" stroke="{colour}" stroke-width="2" '
+                         f'stroke-dasharray="6 4"/><text transform="translate({x - 6:.1f} {bottom - 10}) rotate(-90)">{name}: '
+                         "error not readable</text>")
+    return _page(summary, height, "error over time to light all locations", parts)
+
+
+def _label(x: float, y: float, name: str) -> str:
+    """Text above a point, turned inwards near the edges of the picture."""
+    anchor = "start" if x < _LEFT + 120 else "end" if x > _WIDTH - _RIGHT - 120 else "middle"
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{name}</text>'
+
+
+def _page(summary: dict, height: int, title: str, parts: list[str]) -> str:
+    scene = summary["scene"]
+    heading = escape(f"Gallery, {scene['locations']} locations: {title}")
+    device = escape(f"{summary['device']}; {summary['machine']['cores']} CPU cores; Blender {summary['blender']}")
+    return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {height}" font-family="sans-serif" font-size="13" '
+            f'fill="{_INK}"><title>{heading}</title><rect width="100%" height="100%" fill="#ffffff"/>'
+            f'<text x="14" y="18" font-weight="bold">{heading}</text><text x="14" y="34" font-size="11">{device}</text>'
+            f'{"".join(parts)}</svg>\n')

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``bench peers`` end to end with tiny settings: its rows, its JSON, its files, and peers that fail without ending the rest."""
+
+import json
+from xml.etree import ElementTree
+
+import pytest
+
+TINY = ("bench", "peers", "--panoramas", 2, "--face", 4, "--tolerance", 0.1, "--quiet")
+
+
+@pytest.fixture(scope="module")
+def bench(run_gridlight, tmp_path_factory):
+    """(summary, table, folder) of a bench with errors and without EEVEE."""
+    folder = tmp_path_factory.mktemp("bench") / "new"
+    done = run_gridlight(*TINY, "--no-eevee", "--error", "--error-nodes", 2, "--error-spp", 2, "-o", folder)
+    assert done.returncode == 0, done.stderr
+    *table, last = done.stdout.splitlines()
+    return json.loads(last), "\n".join(table), folder
+
+
+def test_every_peer_has_its_rows_and_its_figures(bench):
+    summary, table, _ = bench
+    rows = summary["rows"]
+    assert [(row["peer"], row["run"]) for row in rows[:2]] == [("Gridlight", "cold"), ("Gridlight", "warm")]
+    assert [row["setting"] for row in rows[2:]] == ["64×32, 8 samples", "32×16, 8 samples", "128×64, 8 samples"]
+    assert summary["scene"]["locations"] == 308 and summary["scene"]["resolution"] == [11, 4, 7]
+    warm = rows[1]["seconds"]
+    for row in rows:
+        assert row["probes_per_second"] == pytest.approx(308 / row["seconds"])
+        assert row["ratio_to_warm"] == pytest.approx(row["seconds"] / warm)
+        assert 0 < row["error"]["relative_rms"] < 1
+        assert row["peer"] in table and row["setting"] in table
+    assert {"setup", "read", "cull", "capture", "light"} <= set(rows[0]["phases"])
+    assert sum(rows[1]["phases"].values()) == pytest.approx(warm, rel=0.2)
+    for key in ("device", "blender", "version", "machine", "command", "warnings"):
+        assert key in summary
+    assert summary["device"] in table and summary["command"] in table
+
+
+def test_few_panoramas_are_scaled_to_all_locations_and_marked(bench):
+    summary, table, _ = bench
+    for row in summary["rows"][2:]:
+        assert row["measured"] == 2
+        first, rest = row["phases"]["first"], row["phases"]["rest"]
+        assert row["seconds"] == pytest.approx(first + rest)
+        assert rest > 10 * first / 308  # the other 307, not the one that was measured
+    assert table.count("2 scaled") == 3
+
+
+def test_more_texels_of_the_same_renderer_are_more_exact(bench):
+    """32×16 panoramas are too coarse for the gallery's lamps: an error that mixes up rows or nodes would not see it."""
+    summary, _, _ = bench
+    coarse, fine = (next(row for row in summary["rows"] if row["setting"].startswith(size)) for size in ("32×16", "128×64"))
+    assert fine["error"]["relative_rms"] < 0.1
+    assert fine["seconds"] > coarse["seconds"]
+    assert summary["reference"]["noise"] < 0.1 and summary["reference"]["floor"]["relative_rms"] < 0.05
+
+
+def test_files_are_whole(bench):
+    summary, table, folder = bench
+    assert sorted(path.name for path in folder.iterdir()) == ["peers.json", "peers.svg", "peers.txt"]
+    assert (folder / "peers.txt").read_text(encoding="utf-8").strip() == table.strip()
+    assert json.loads((folder / "peers.json").read_text(encoding="utf-8")) == summary
+    picture = ElementTree.parse(folder / "peers.svg").getroot()
+    circles = [element for element in picture.iter() if element.tag.endswith("circle")]
+    assert len(circles) == len(summary["rows"])
+
+
+def test_our_own_bake_past_its_limit_ends_the_bench(run_gridlight):
+    """Without our own bake there is nothing to compare with: the bench says so instead of printing half a table."""
+    done = run_gridlight(*TINY, "--limit", 1)
+    assert done.returncode == 2
+    assert "not done after 1 s" in done.stderr and "our own bake" in done.stderr
+    assert done.stdout == ""
+
+
+def test_eevee_bakes_the_same_volume_or_says_why_not(run_gridlight):
+    done = run_gridlight(*TINY, "--eevee-samples", 1)
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout.splitlines()[-1])
+    rows = [row for row in summary["rows"] if row["peer"] == "EEVEE volume"]
+    if rows[-1]["seconds"] is None:
+        assert rows[-1]["problem"] and rows[-1]["problem"] in done.stdout
+    else:
+        assert [row["run"] for row in rows] == ["cold", "warm"]
+        assert rows[0]["seconds"] > rows[1]["seconds"] > 0
+    assert all(row["error"] is None for row in summary["rows"]) and summary["reference"] is None
+
+
+@pytest.mark.parametrize("arguments", [("--panoramas", "0"), ("--error-nodes", "0"), ("--limit", "nan"), ("--face", "1"),
+                                       ("--eevee-samples", "-1"), ("-o", "/dev/null/x")])
+def test_wrong_options_are_refused_before_anything_runs(run_gridlight, arguments):
+    done = run_gridlight("bench", "peers", *arguments)
+    assert done.returncode == 2
+    assert done.stdout == "" and len(done.stderr.splitlines()) == 1
+
+
+def test_unknown_benchmark_is_refused(run_gridlight):
+    assert run_gridlight("bench", "nonsense").returncode == 2
