@@ -387,7 +387,7 @@ _NODES = {
     "ShaderNodeCombineXYZ": _combine,
     "ShaderNodeRGBToBW": lambda e, node, socket, scope: as_number(e.input(node, "Color", scope)),
     "ShaderNodeBlackbody": lambda e, node, socket, scope: constant(
-        blackbody_color(e.input(node, "Temperature", scope).number())
+        shader_math.blackbody_color(e.input(node, "Temperature", scope).number())
     ),
     "ShaderNodeLightPath": _light_path,
     "ShaderNodeNewGeometry": _geometry,
@@ -396,14 +396,3 @@ _NODES = {
     "ShaderNodeObjectInfo": _object_info,
     "ShaderNodeLightFalloff": _light_falloff,
 }
-
-
-def blackbody_color(kelvin: float) -> np.ndarray:
-    """(3,) linear Rec. 709 colour of a black body with luminance 1, by Blender itself through a light's temperature."""
-    light = bpy.data.lights.new("Gridlight Temperature", "POINT")
-    try:
-        light.use_temperature = True
-        light.temperature = kelvin
-        return np.array(light.temperature_color, float)
-    finally:
-        bpy.data.lights.remove(light)

@@ -336,7 +336,7 @@ def test_scale(scale, capture):
 
 
 def test_a_rotated_volume_is_a_rotated_scene():
-    """Cubemaps stay aligned with the world, so texels differ: what is left is sampling noise of 32² faces."""
+    """Cubemaps and depth maps stay aligned with the world: what is left is their different sampling of the scene."""
     rotation, _ = np.linalg.qr(np.random.default_rng(4).normal(size=(3, 3)))
     rotation *= np.linalg.det(rotation)
     turn = np.eye(4)
@@ -350,7 +350,7 @@ def test_a_rotated_volume_is_a_rotated_scene():
     assert (straight.field.state == turned.field.state).all()
     expected = irradiance_at_nodes(straight.field, NORMALS)
     found = irradiance_at_nodes(turned.field, NORMALS @ rotation.T)
-    assert relative_rms(found, expected) < 1e-2
+    assert relative_rms(found, expected) < 1.5e-2
 
 
 def test_twice_the_light_is_twice_the_field():
