@@ -185,14 +185,3 @@ def map_range(value, from_min, from_max, to_min, to_max, interpolation: str, cla
         )
     result = to_min + share * (to_max - to_min)
     return np.clip(result, np.minimum(to_min, to_max), np.maximum(to_min, to_max)) if clamp else result
-
-
-def blackbody_color(kelvin: float) -> np.ndarray:
-    """(3,) linear Rec. 709 colour of a black body with luminance 1, by Blender itself through a light's temperature."""
-    light = bpy.data.lights.new("Gridlight Temperature", "POINT")
-    try:
-        light.use_temperature = True
-        light.temperature = kelvin
-        return np.array(light.temperature_color, float)
-    finally:
-        bpy.data.lights.remove(light)

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from . import shader_math
+from .blackbody import blackbody_color
 from .images import ImageTable
 from .node_links import Reported, Scope, Unsupported, find_socket, resolve
 from .notices import Notices
@@ -387,7 +388,7 @@ _NODES = {
     "ShaderNodeCombineXYZ": _combine,
     "ShaderNodeRGBToBW": lambda e, node, socket, scope: as_number(e.input(node, "Color", scope)),
     "ShaderNodeBlackbody": lambda e, node, socket, scope: constant(
-        shader_math.blackbody_color(e.input(node, "Temperature", scope).number())
+        blackbody_color(e.input(node, "Temperature", scope).number())
     ),
     "ShaderNodeLightPath": _light_path,
     "ShaderNodeNewGeometry": _geometry,
