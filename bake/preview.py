@@ -17,7 +17,7 @@ from ..gpu_shaders.preview_pass import PreviewPass
 from ..gpu_shaders.scene_textures import SceneTextures
 
 WIDTH, HEIGHT = 960, 540
-_SAMPLES = 4  # per pixel
+_SAMPLES = 8  # per pixel
 
 
 def write_previews(

@@ -17,20 +17,47 @@ NEEDS_BLENDER = NEEDS_GPU = False  # this process only starts others, which have
 
 
 def add_arguments(parser, in_blender: bool) -> None:
-    parser.add_argument("name", metavar="NAME", nargs="?", choices=("peers",), default="peers",
-                        help="peers: the gallery by our bake, by Cycles panoramas and by EEVEE (default, and so far the only one)")
+    parser.add_argument(
+        "name",
+        metavar="NAME",
+        nargs="?",
+        choices=("peers",),
+        default="peers",
+        help="peers: the gallery by our bake, Cycles panoramas and EEVEE (default; the only one)",
+    )
     parser.add_argument("-o", "--output", metavar="DIR", help="folder for peers.txt, peers.json and peers.svg")
-    parser.add_argument("--panoramas", metavar="N", type=int,
-                        help="measure Cycles at N of the grid's locations and scale (default: at all)")
+    parser.add_argument(
+        "--panoramas",
+        metavar="N",
+        type=int,
+        help="measure Cycles at N of the grid's locations and scale (default: at all)",
+    )
     parser.add_argument("--no-eevee", action="store_true", help="leave EEVEE out")
-    parser.add_argument("--eevee-samples", metavar="N", type=int, default=2048,
-                        help="samples of EEVEE's volume bake (default %(default)s, which is Blender's)")
+    parser.add_argument(
+        "--eevee-samples",
+        metavar="N",
+        type=int,
+        default=2048,
+        help="samples of EEVEE's volume bake (default %(default)s, which is Blender's)",
+    )
     parser.add_argument("--error", action="store_true", help="also measure irradiance errors at free nodes")
-    parser.add_argument("--error-nodes", metavar="N", type=int, default=24, help="nodes for --error (default %(default)s)")
-    parser.add_argument("--error-spp", metavar="S", type=int, default=128,
-                        help="samples of the 128×64 reference for --error, in each of two seeds (default %(default)s)")
-    parser.add_argument("--limit", metavar="SECONDS", type=float, default=1800.0,
-                        help="time that each peer may take (default %(default)s)")
+    parser.add_argument(
+        "--error-nodes", metavar="N", type=int, default=24, help="nodes for --error (default %(default)s)"
+    )
+    parser.add_argument(
+        "--error-spp",
+        metavar="S",
+        type=int,
+        default=128,
+        help="samples of the 128×64 reference for --error, in each of two seeds (default %(default)s)",
+    )
+    parser.add_argument(
+        "--limit",
+        metavar="SECONDS",
+        type=float,
+        default=1800.0,
+        help="time that each peer may take (default %(default)s)",
+    )
     bake.add_settings(parser)
     parser.add_argument("--quiet", action="store_true", help="no progress; warnings stay")
     parser.add_argument("--verbose", action="store_true", help="show what Blender itself prints")
@@ -41,9 +68,13 @@ def add_arguments(parser, in_blender: bool) -> None:
 def check(args) -> None:
     """What can be refused before anything is measured."""
     bake.settings_from(args)
-    for name, value, low, high in (("--panoramas", args.panoramas, 1, 1 << 24), ("--error-nodes", args.error_nodes, 1, 1000),
-                                   ("--eevee-samples", args.eevee_samples, 1, 1 << 20),
-                                   ("--error-spp", args.error_spp, 1, 1 << 20), ("--limit", args.limit, 1, 1e6)):
+    for name, value, low, high in (
+        ("--panoramas", args.panoramas, 1, 1 << 24),
+        ("--error-nodes", args.error_nodes, 1, 1000),
+        ("--eevee-samples", args.eevee_samples, 1, 1 << 20),
+        ("--error-spp", args.error_spp, 1, 1 << 20),
+        ("--limit", args.limit, 1, 1e6),
+    ):
         if value is not None and not low <= value <= high:
             raise InputError(f"{name} is {value}; it must lie between {low} and {high:g}")
 

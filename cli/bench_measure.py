@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The measurements of ``bench``: what runs in a process of its own per peer. All of them light the gallery of ``demo``.
 
-* ``gridlight``: reading the scene and the bake to convergence, twice: cold with GPU context and shader compilation, then warm.
-* ``cycles``: one panorama per location of the grid, with persistent data. Building the scene and projecting are not counted.
-* ``eevee``: Blender's own bake of a light probe volume with the same nodes, cold with GPU context and shaders, then warm.
+* ``gridlight``: reading the scene and the bake to convergence, twice: cold with GPU context and shader compilation,
+  then warm.
+* ``cycles``: one panorama per location of the grid, with persistent data. Building the scene and projecting are not
+  counted.
+* ``eevee``: Blender's own bake of a light probe volume with the same nodes, cold with GPU context and shaders, then
+  warm.
 * ``reference``: what errors are measured against; not a peer, not timed.
 
-Every report is one JSON object on standard output: ``{"run": …}`` is a row of the table, ``{"problem": …}`` why there is no more.
+Every report is one JSON object on standard output: ``{"run": …}`` is a row of the table, ``{"problem": …}`` why there
+is no more.
 """
 
 from __future__ import annotations
@@ -74,13 +78,27 @@ def _gridlight(scene, request: dict, reporter, should_stop) -> int:
         grid = Grid(volume.matrix, volume.resolution, volume.name)
         result = pipeline.bake_volumes(snapshot, [grid], settings, reporter, should_stop, stopwatch)[0]
         seconds = stopwatch.totals()
-        _report({"run": run, "seconds": seconds.pop("total"), "measured": grid.count,
-                 "phases": {phase: value for phase, value in seconds.items() if phase != "write"}})
-    _report({"blender": bpy.app.version_string,
-             "scene": {"locations": grid.count, "resolution": list(grid.resolution), "triangles": len(snapshot.triangles),
-                       "probes": result.counts},
-             "bake": {"iterations": result.iterations, "converged": result.converged, "capture": result.capture},
-             "device": device_description()})
+        _report(
+            {
+                "run": run,
+                "seconds": seconds.pop("total"),
+                "measured": grid.count,
+                "phases": {phase: value for phase, value in seconds.items() if phase != "write"},
+            }
+        )
+    _report(
+        {
+            "blender": bpy.app.version_string,
+            "scene": {
+                "locations": grid.count,
+                "resolution": list(grid.resolution),
+                "triangles": len(snapshot.triangles),
+                "probes": result.counts,
+            },
+            "bake": {"iterations": result.iterations, "converged": result.converged, "capture": result.capture},
+            "device": device_description(),
+        }
+    )
     if request["nodes"]:
         reporter.phase("error nodes")
         nodes = _free_nodes(result.field, FreeSpace(snapshot), request["nodes"], settings.seed)
@@ -88,11 +106,13 @@ def _gridlight(scene, request: dict, reporter, should_stop) -> int:
         ours = lookup.irradiance(result.field, np.repeat(nodes, count, axis=0), np.tile(SIX_NORMALS, (len(nodes), 1)))
         _report({"nodes": nodes.tolist(), "irradiance": ours.reshape(len(nodes), count, 3).tolist()})
     reporter.finish()
-    return 0 if result.converged else pipeline.NOT_CONVERGED
+    return 0 if result.converged or settings.bounces is not None else pipeline.NOT_CONVERGED
 
 
 def _free_nodes(field: Field, space: FreeSpace, count: int, seed: int) -> np.ndarray:
-    """Up to ``count`` (N, 3) positions of active nodes in free space that the bake left in their place, chosen by ``seed``.
+    """Up to ``count`` (N, 3) world positions of active nodes in free space, chosen by ``seed``.
+
+    Nodes that the bake moved are left out: a node's own light is compared, not an interpolation.
 
     Raises:
         InputError: there is none.
@@ -125,10 +145,14 @@ def _cycles(scene, request: dict, reporter, should_stop) -> None:
     first, rest = ticks[0] - started, ticks[-1] - ticks[0]
     if measured < total:  # the first panorama also carries the scene to Cycles, once: only the others are scaled
         rest = rest / (measured - 1) * (total - 1) if measured > 1 else first * (total - 1)
-    _report({"run": "warm", "seconds": first + rest, "measured": measured, "phases": {"first": first, "rest": rest}})
+    _report(
+        {"run": "persistent", "seconds": first + rest, "measured": measured, "phases": {"first": first, "rest": rest}}
+    )
     if request["nodes"]:
         reporter.phase("error nodes", len(request["nodes"]))
-        images = render_panoramas(scene, np.array(request["nodes"]), width, height, samples, PEER_SEED, progress=progress)
+        images = render_panoramas(
+            scene, np.array(request["nodes"]), width, height, samples, PEER_SEED, progress=progress
+        )
         coefficients = np.stack([project_panorama(image, request["bands"]) for image in images])
         _report({"irradiance": sh.irradiance(coefficients[:, None], SIX_NORMALS).tolist()})
     reporter.finish()
@@ -143,8 +167,10 @@ def _reference(scene, request: dict, reporter, should_stop) -> None:
             raise Cancelled("cancelled")
 
     reporter.phase("reference", len(REFERENCE_SEEDS) * len(nodes))
-    images = [render_panoramas(scene, nodes, REFERENCE_WIDTH, REFERENCE_HEIGHT, request["samples"], seed, progress=progress)
-              for seed in REFERENCE_SEEDS]
+    images = [
+        render_panoramas(scene, nodes, REFERENCE_WIDTH, REFERENCE_HEIGHT, request["samples"], seed, progress=progress)
+        for seed in REFERENCE_SEEDS
+    ]
     series = [[panorama_irradiance(image, SIX_NORMALS).tolist() for image in row] for row in images]
     perfect = np.stack([project_panorama(image, request["bands"]) for image in np.mean(images, axis=0)])
     _report({"series": series, "floor": sh.irradiance(perfect[:, None], SIX_NORMALS).tolist()})
@@ -169,8 +195,14 @@ def _eevee(scene, request: dict, reporter, should_stop) -> None:
         # The operator also finishes where it has given up, so what it is timed for has to be there.
         if done != {"FINISHED"} or _stored_bytes(item) - empty < 4 * _EEVEE_VALUES * count:
             raise InputError("EEVEE's bake ended without a result (--verbose shows Blender's words)")
-        _report({"run": run, "seconds": seconds["total"], "measured": count,
-                 "phases": {"setup": seconds["setup"], "bake": seconds["light"]}})
+        _report(
+            {
+                "run": run,
+                "seconds": seconds["total"],
+                "measured": count,
+                "phases": {"setup": seconds["setup"], "bake": seconds["light"]},
+            }
+        )
         bpy.ops.object.lightprobe_cache_free(subset="ALL")
     reporter.finish()
 

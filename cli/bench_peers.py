@@ -23,7 +23,7 @@ CYCLES_SETTINGS = ((64, 32, 8), (32, 16, 8), (128, 64, 8))
 
 
 def run(args, reporter, folder) -> tuple[dict, int]:
-    """Measures all peers. Returns (summary, exit status of our own bake); stages the files in ``folder`` unless it is None.
+    """Measures all peers. Returns (summary, exit status of our own bake); stages files in ``folder`` unless it is None.
 
     Raises:
         InputError: our own bake could not be measured, without which the others have nothing to be compared with.
@@ -36,14 +36,21 @@ def run(args, reporter, folder) -> tuple[dict, int]:
     machine = _machine()
     bench = _Bench(args, reporter)
     settings = bake.settings_from(args)
-    ours, own_rows = bench.peer({"peer": "gridlight", "settings": vars(settings), "nodes": args.error_nodes if args.error else 0},
-                                "Gridlight", "default" if settings == type(settings)() else _differences(settings))
+    request = {"peer": "gridlight", "settings": vars(settings), "nodes": args.error_nodes if args.error else 0}
+    ours, own_rows = bench.peer(request, "Gridlight", _differences(settings) or "default")
     if not {"scene", "device"} <= set(ours) or "problem" in own_rows[-1]:
-        raise InputError(f"our own bake could not be measured: {own_rows[-1].get('problem') or 'its process said nothing'}")
+        raise InputError(
+            f"our own bake could not be measured: {own_rows[-1].get('problem') or 'its process said nothing'}"
+        )
     nodes = ours.get("nodes", [])
     for width, height, samples in CYCLES_SETTINGS:
-        request = {"peer": "cycles", "panorama": [width, height, samples], "panoramas": args.panoramas, "nodes": nodes,
-                   "bands": settings.bands}
+        request = {
+            "peer": "cycles",
+            "panorama": [width, height, samples],
+            "panoramas": args.panoramas,
+            "nodes": nodes,
+            "bands": settings.bands,
+        }
         bench.peer(request, "Cycles panoramas", f"{width}×{height}, {samples} samples")
     if not args.no_eevee:
         bench.peer({"peer": "eevee", "samples": args.eevee_samples}, "EEVEE volume", f"{args.eevee_samples} samples")
@@ -88,9 +95,10 @@ class _Bench:
         self._irradiance: list[np.ndarray | None] = []  # (N, 6, 3) per row
 
     def child(self, request: dict) -> tuple[dict, list[dict]]:
-        """Runs one measurement. Returns (its reports merged, those of them that are rows); "problem" as in the reports."""
+        """Runs one measurement. Returns (its reports merged, with "problem" where it ended early; those that are rows)."""
         options = ["--quiet"] * self._args.quiet
-        reports, problem = bench_process.measure_in_child(request, self._args.limit, options, self._args.in_blender, self._args.verbose)
+        args = self._args
+        reports, problem = bench_process.measure_in_child(request, args.limit, options, args.in_blender, args.verbose)
         merged = {}
         for report in reports:
             if "run" not in report:
@@ -103,15 +111,20 @@ class _Bench:
         return merged, [report for report in reports if "run" in report]
 
     def peer(self, request: dict, name: str, setting: str) -> tuple[dict, list[dict]]:
-        """Measures one peer and adds its rows, one without a time where it ended early. Returns (its reports merged, its rows)."""
+        """Measures one peer and adds its rows, one without a time where it ended early.
+
+        Returns (its reports merged, its rows).
+        """
         self._reporter.note(f"{name}, {setting}")
         merged, runs = self.child(request)
         if "problem" in merged:
             self._reporter.warn(f"{name}, {setting}: {merged['problem']}")
             runs = [*runs, {"run": "", "seconds": None, "measured": 0, "phases": {}, "problem": merged["problem"]}]
         irradiance = np.array(merged["irradiance"]) if "irradiance" in merged else None
-        rows = [{"peer": name, "setting": setting, "probes_per_second": None, "ratio_to_warm": None, "error": None, **run}
-                for run in runs]
+        rows = [
+            {"peer": name, "setting": setting, "probes_per_second": None, "ratio_to_warm": None, "error": None, **run}
+            for run in runs
+        ]
         self.rows += rows
         self._irradiance += [irradiance] * len(rows)
         return merged, rows
@@ -128,9 +141,17 @@ class _Bench:
         for row, irradiance in zip(self.rows, self._irradiance):
             if irradiance is not None and row["seconds"] is not None:
                 row["error"] = measures.compare(irradiance, truth).as_dict()
-        return {"engine": "Cycles", "width": 128, "height": 64, "samples": samples, "seeds": len(series), "nodes": len(nodes),
-                "noise": measures.noise_of_mean(*series), "floor": measures.compare(np.array(merged["floor"]), truth).as_dict(),
-                "bands": bands}
+        return {
+            "engine": "Cycles",
+            "width": 128,
+            "height": 64,
+            "samples": samples,
+            "seeds": len(series),
+            "nodes": len(nodes),
+            "noise": measures.noise_of_mean(*series),
+            "floor": measures.compare(np.array(merged["floor"]), truth).as_dict(),
+            "bands": bands,
+        }
 
 
 def _differences(settings) -> str:
@@ -143,7 +164,12 @@ def _machine() -> dict:
     """What the times depend on besides the GPU; the load tells whether others were at work when the bench began."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
-    return {"processor": _processor(), "cores": cores, "load_before": load, "system": f"{platform.system()} {platform.machine()}"}
+    return {
+        "processor": _processor(),
+        "cores": cores,
+        "load_before": load,
+        "system": f"{platform.system()} {platform.machine()}",
+    }
 
 
 def _processor() -> str:
@@ -157,5 +183,5 @@ def _processor() -> str:
 
 def _command() -> str:
     """The command line that was given, without what starts it."""
-    words = sys.argv[sys.argv.index("bench"):] if "bench" in sys.argv else ["bench"]
+    words = sys.argv[sys.argv.index("bench") :] if "bench" in sys.argv else ["bench"]
     return f"./gridlight {shlex.join(words)}"

@@ -11,7 +11,7 @@ from html import escape
 
 from .bench_table import significant
 
-_WIDTH, _LEFT, _RIGHT, _TOP, _BOTTOM = 860, 70, 40, 44, 46
+_WIDTH, _LEFT, _RIGHT, _TOP, _BOTTOM = 860, 70, 40, 46, 46
 _COLOURS = {"Gridlight": "#c2410c", "Cycles panoramas": "#1d4ed8", "EEVEE volume": "#15803d"}
 _GREY, _INK = "#d4d4d4", "#262626"
 
@@ -23,7 +23,11 @@ def plot(summary: dict) -> str:
 
 
 def _name(row: dict) -> str:
-    return f"{row['peer']}, {row['setting']}" + (f", {row['run']}" if row["peer"] != "Cycles panoramas" else "")
+    return f"{row['peer']}, {_setting(row)}"
+
+
+def _setting(row: dict) -> str:
+    return row["setting"] if row["run"] == "persistent" else f"{row['setting']}, {row['run']}"
 
 
 class _Scale:
@@ -49,8 +53,10 @@ def _time_axis(scale: _Scale, top: float, bottom: float) -> list[str]:
     parts = []
     for value, label in scale.ticks():
         at = scale(value)
-        parts.append(f'<line x1="{at:.1f}" x2="{at:.1f}" y1="{top}" y2="{bottom}" stroke="{_GREY}"/>'
-                     f'<text x="{at:.1f}" y="{bottom + 17}" text-anchor="middle">{label}</text>')
+        parts.append(
+            f'<line x1="{at:.1f}" x2="{at:.1f}" y1="{top}" y2="{bottom}" stroke="{_GREY}"/>'
+            f'<text x="{at:.1f}" y="{bottom + 17}" text-anchor="middle">{label}</text>'
+        )
     middle = (scale(10.0**scale.low) + scale(10.0**scale.high)) / 2
     parts.append(f'<text x="{middle:.1f}" y="{bottom + 36}" text-anchor="middle">seconds</text>')
     return parts
@@ -65,9 +71,11 @@ def _bars(summary: dict, rows: list[dict]) -> str:
     for index, row in enumerate(rows):
         top = _TOP + 28 * index + 5
         end = scale(row["seconds"])
-        parts.append(f'<text x="{names_end - 8}" y="{top + 14}" text-anchor="end">{escape(_name(row))}</text>'
-                     f'<rect x="{names_end}" y="{top}" width="{max(end - names_end, 1):.1f}" height="19" fill="{_COLOURS[row["peer"]]}"/>'
-                     f'<text x="{end + 6:.1f}" y="{top + 14}">{significant(row["seconds"])} s</text>')
+        parts.append(
+            f'<text x="{names_end - 8}" y="{top + 14}" text-anchor="end">{escape(_name(row))}</text>'
+            f'<rect x="{names_end}" y="{top}" width="{max(end - names_end, 1):.1f}" height="19" fill="{_COLOURS[row["peer"]]}"/>'
+            f'<text x="{end + 6:.1f}" y="{top + 14}">{significant(row["seconds"])} s</text>'
+        )
     return _page(summary, height, "time to light all locations", parts)
 
 
@@ -81,36 +89,69 @@ def _error_over_time(summary: dict, rows: list[dict]) -> str:
     up = _Scale([value for value in [*errors, floor] if value > 0], bottom, _TOP)
     parts = _time_axis(across, _TOP, bottom)
     for value, label in up.ticks():
-        parts.append(f'<line x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{up(value):.1f}" y2="{up(value):.1f}" stroke="{_GREY}"/>'
-                     f'<text x="{_LEFT - 8}" y="{up(value) + 4:.1f}" text-anchor="end">{label}</text>')
-    parts.append(f'<text transform="translate(18 {(_TOP + bottom) / 2}) rotate(-90)" text-anchor="middle">error, % relative RMS</text>')
+        parts.append(
+            f'<line x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{up(value):.1f}" y2="{up(value):.1f}" stroke="{_GREY}"/>'
+            f'<text x="{_LEFT - 8}" y="{up(value) + 4:.1f}" text-anchor="end">{label}</text>'
+        )
+    parts.append(
+        f'<text transform="translate(18 {(_TOP + bottom) / 2}) rotate(-90)" text-anchor="middle">error, % relative RMS</text>'
+    )
     if floor > 0:
-        parts.append(f'<line x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{up(floor):.1f}" y2="{up(floor):.1f}" stroke="{_INK}" '
-                     f'stroke-dasharray="2 4"/><text x="{_WIDTH - _RIGHT - 4}" y="{up(floor) - 6:.1f}" text-anchor="end">'
-                     f'floor of {reference["bands"]} bands</text>')
+        parts.append(
+            f'<line x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{up(floor):.1f}" y2="{up(floor):.1f}" stroke="{_INK}" '
+            f'stroke-dasharray="2 4"/><text x="{_WIDTH - _RIGHT - 4}" y="{up(floor) - 6:.1f}" text-anchor="end">'
+            f"floor of {reference['bands']} bands</text>"
+        )
+    labels = _Labels()
     for row in rows:
-        x, colour, name = across(row["seconds"]), _COLOURS[row["peer"]], escape(_name(row))
+        x, colour = across(row["seconds"]), _COLOURS[row["peer"]]
         if row["error"]:
             y = up(100 * row["error"]["relative_rms"])
-            parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="6" fill="{colour}"/>{_label(x, y - 11, name)}')
+            parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="6" fill="{colour}"/>')
+            parts.append(labels.beside(x, y, _setting(row)))
         else:  # its time is known, its error is not
-            parts.append(f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{_TOP}" y2="{bottom}" stroke="{colour}" stroke-width="2" '
-                         f'stroke-dasharray="6 4"/><text transform="translate({x - 6:.1f} {bottom - 10}) rotate(-90)">{name}: '
-                         "error not readable</text>")
+            text = escape(f"{_name(row)}: error not readable")
+            parts.append(
+                f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{_TOP}" y2="{bottom}" stroke="{colour}" '
+                'stroke-width="2" stroke-dasharray="6 4"/>'
+                f'<text transform="translate({x - 6:.1f} {bottom - 10}) rotate(-90)">{text}</text>'
+            )
+    for index, peer in enumerate(dict.fromkeys(row["peer"] for row in rows)):
+        left = _WIDTH - _RIGHT - 150 * (index + 1)
+        parts.append(
+            f'<circle cx="{left}" cy="14" r="6" fill="{_COLOURS[peer]}"/>'
+            f'<text x="{left + 11}" y="18">{escape(peer)}</text>'
+        )
     return _page(summary, height, "error over time to light all locations", parts)
 
 
-def _label(x: float, y: float, name: str) -> str:
-    """Text above a point, turned inwards near the edges of the picture."""
-    anchor = "start" if x < _LEFT + 120 else "end" if x > _WIDTH - _RIGHT - 120 else "middle"
-    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{name}</text>'
+class _Labels:
+    """Puts texts near points so that they do not cover each other."""
+
+    _CHARACTER, _LINE = 7.2, 15  # room that a character and a line take
+
+    def __init__(self):
+        self._taken: list[tuple[float, float, float]] = []  # left, right, baseline
+
+    def beside(self, x: float, y: float, text: str) -> str:
+        """``text`` above (x, y), else below it, else further up; shifted inwards at the edges of the picture."""
+        width = self._CHARACTER * len(text)
+        left = min(max(x - width / 2, _LEFT + 4), _WIDTH - _RIGHT - 4 - width)
+        above = (y - 11 - self._LINE * step for step in range(20))
+        for baseline in (y - 11, y + 21, *above):
+            if all(left > r or left + width < l or abs(baseline - b) >= self._LINE for l, r, b in self._taken):
+                break
+        self._taken.append((left, left + width, baseline))
+        return f'<text x="{left + width / 2:.1f}" y="{baseline:.1f}" text-anchor="middle">{escape(text)}</text>'
 
 
 def _page(summary: dict, height: int, title: str, parts: list[str]) -> str:
     scene = summary["scene"]
     heading = escape(f"Gallery, {scene['locations']} locations: {title}")
     device = escape(f"{summary['device']}; {summary['machine']['cores']} CPU cores; Blender {summary['blender']}")
-    return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {height}" font-family="sans-serif" font-size="13" '
-            f'fill="{_INK}"><title>{heading}</title><rect width="100%" height="100%" fill="#ffffff"/>'
-            f'<text x="14" y="18" font-weight="bold">{heading}</text><text x="14" y="34" font-size="11">{device}</text>'
-            f'{"".join(parts)}</svg>\n')
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {height}" font-family="sans-serif" font-size="13" '
+        f'fill="{_INK}"><title>{heading}</title><rect width="100%" height="100%" fill="#ffffff"/>'
+        f'<text x="14" y="18" font-weight="bold">{heading}</text><text x="14" y="34" font-size="11">{device}</text>'
+        f"{''.join(parts)}</svg>\n"
+    )

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs one measurement of ``bench`` in a process of its own, so that a peer that crashes or hangs ends only itself.
 
-The process is a child as ``cli.worker`` describes it, with two differences: its standard output comes back to us, one JSON
-object a line as soon as each is known, and it has a time limit.
+The process is a child as ``cli.worker`` describes it, with two differences: its standard output comes back to us, one
+JSON object a line as soon as each is known, and it has a time limit.
 """
 
 from __future__ import annotations
@@ -21,11 +21,13 @@ from . import worker
 NO_SHADER_CACHES = {"MESA_SHADER_CACHE_DISABLE": "true", "__GL_SHADER_DISK_CACHE": "0"}
 
 
-def measure_in_child(request: dict, limit_s: float, options: list[str], in_blender: bool, verbose: bool) -> tuple[list[dict], str]:
+def measure_in_child(
+    request: dict, limit_s: float, options: list[str], in_blender: bool, verbose: bool
+) -> tuple[list[dict], str]:
     """Measures ``request`` (see ``bench_measure.measure``).
 
-    Returns (what the process reported, why it ended early). The reason is empty where it did not; what was reported before
-    counts all the same.
+    Returns (what the process reported, why it ended early). The reason is empty where it did not; what was reported
+    before counts all the same.
     """
     status_read, status_write = os.pipe()
     alive_read, alive_write = os.pipe()
@@ -34,7 +36,11 @@ def measure_in_child(request: dict, limit_s: float, options: list[str], in_blend
         child = subprocess.Popen(
             [*_program(in_blender), "bench", "peers", "--measure", json.dumps(request), *options],
             env={**os.environ, **NO_SHADER_CACHES, worker.DESCRIPTORS: ",".join(map(str, descriptors))},
-            pass_fds=descriptors, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, process_group=0)
+            pass_fds=descriptors,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            process_group=0,
+        )
         try:
             os.close(status_write)
             os.close(alive_read)

@@ -39,38 +39,49 @@ def _rows(summary: dict) -> list[str]:
             continue
         scaled = row["measured"] < summary["scene"]["locations"]
         error = [f"{100 * row['error']['relative_rms']:.2f}" if row["error"] else "–"] if errors else []
-        cells.append([row["peer"], row["setting"], f"{row['measured']} scaled" if scaled else row["run"],
-                      significant(row["seconds"]), significant(row["probes_per_second"]), significant(row["ratio_to_warm"]), *error])
+        figures = [significant(row[name]) for name in ("seconds", "probes_per_second", "ratio_to_warm")]
+        run = f"{row['measured']} scaled" if scaled else row["run"]
+        cells.append([row["peer"], row["setting"], run, *figures, *error])
     widths = [max(len(line[column]) for line in cells if len(line) == len(cells[0])) for column in range(len(cells[0]))]
     for column in (0, 1):  # rows without figures have these too
         widths[column] = max(len(line[column]) for line in cells)
-    return ["  ".join(cell.ljust(width) if column < 3 else cell.rjust(width)
-                      for column, (cell, width) in enumerate(zip(line, widths))).rstrip() for line in cells]
+    return [
+        "  ".join(
+            cell.ljust(width) if column < 3 else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(line, widths))
+        ).rstrip()
+        for line in cells
+    ]
 
 
 def _notes(summary: dict) -> list[str]:
-    lines = ["Seconds for all locations; probes/s are locations by seconds. Every peer ran in a process of its own, driver shader caches off;",
-             "cold: first bake of its process, GPU context and shader compilation included. Building the scene is not counted.",
-             "Cycles: persistent data; carrying the scene to it is in the first panorama; projecting to SH is not counted."]
-    if any(row["measured"] and row["measured"] < summary["scene"]["locations"] for row in summary["rows"]):
-        lines.append("Scaled: that many locations were measured, their mean time without the first one's stands for the others.")
+    lines = [
+        "Seconds for all locations; probes/s are locations by seconds. Every peer ran in a process of its own, driver",
+        "shader caches off. Cold: first bake of its process, GPU context and shader compilation included.",
+        "Building the scene is not counted. Persistent: Cycles with persistent data; its first panorama carries the",
+        "scene over. Projecting panoramas to SH is not counted.",
+    ]
+    if any(0 < row["measured"] < summary["scene"]["locations"] for row in summary["rows"]):
+        lines.append(
+            "Scaled: so many locations were measured; their mean time, the first aside, stands for the others."
+        )
     reference = summary["reference"]
     if reference:
-        lines += [f"Error: relative RMS of irradiance at {reference['nodes']} free nodes, six normals, against Cycles "
-                  f"{reference['width']}×{reference['height']}, {reference['seeds']} × {reference['samples']} samples, whose noise is "
-                  f"{100 * reference['noise']:.2f} %.",
-                  f"No {reference['bands']}-band probe can do better than {100 * reference['floor']['relative_rms']:.2f} %. EEVEE's probes "
-                  "cannot be read."]
+        size = f"{reference['width']}×{reference['height']}"
+        lines += [
+            f"Error: relative RMS of irradiance at {reference['nodes']} free nodes, six normals, against Cycles {size},",
+            f"{reference['seeds']} × {reference['samples']} samples, whose noise is {100 * reference['noise']:.2f} %. "
+            f"No {reference['bands']}-band probe can do better than {100 * reference['floor']['relative_rms']:.2f} %.",
+            "EEVEE's probes cannot be read.",
+        ]
     lines += ["", "Seconds by phase"]
     for row in summary["rows"]:
         if row["phases"]:
-            phases = ", ".join(f"{name} {significant(value)}" for name, value in row["phases"].items() if value)
+            phases = ", ".join(f"{name} {significant(value)}" for name, value in row["phases"].items() if value >= 1e-5)
             lines.append(f"{row['peer']}, {row['setting']}, {row['run']}: {phases}")
     return lines
 
 
 def significant(value: float) -> str:
     """Three significant digits, without an exponent."""
-    if value >= 100:
-        return f"{value:.0f}"
-    return f"{value:.2g}" if value < 1e-3 else f"{value:#.3g}"
+    return f"{value:.0f}" if value >= 100 else f"{value:.6f}" if value < 1e-3 else f"{value:#.3g}"

@@ -36,10 +36,10 @@ vec3 trace_path(vec3 origin, vec3 normal, uvec3 key, int path)
     }
     origin = step_off(surface.position, surface.normal, -direction, hit.distance);
     normal = surface.normal;
-    uvec3 light_key = pcg3d(bounce_key + uvec3(0u, 0u, uint(path)));
-    vec3 irradiance = lamps_irradiance(surface.position, origin, normal, light_key, 0);
+    uvec3 light_key = bounce_key + uvec3(0u, 0x1B873593u, 0u);
+    vec3 irradiance = lamps_irradiance(surface.position, origin, normal, light_key, path);
 #ifdef HAS_EMITTERS
-    irradiance += emitter_irradiance(surface.position, origin, normal, light_key, 0);
+    irradiance += emitter_irradiance(surface.position, origin, normal, light_key, path);
 #endif
     if (bounce == bounces - 1) {
       irradiance += end_irradiance(surface.position, normal);

@@ -17,7 +17,7 @@ vec3 shade_surface(Surface surface, vec3 direction, float distance, uvec3 key)
   vec3 irradiance = vec3(0.0);
   vec3 origin = step_off(surface.position, surface.normal, -direction, distance);
   if (show_direct != 0) {
-    irradiance = lamps_irradiance(surface.position, origin, surface.normal, key, 0);
+    irradiance = lamps_irradiance(surface.position, origin, surface.normal, key, sample_index);
   }
   float weights[8];
   int first_node = node_index(lookup_cell(surface.position, surface.normal, weights));
@@ -66,7 +66,7 @@ void main()
   if (pixel.x >= size.x || pixel.y >= size.y) {
     return;
   }
-  uvec3 key = uvec3(uint(pixel.x), uint(pixel.y), uint(sample_index) + 0x51ED270Bu);
+  uvec3 key = uvec3(uint(pixel.x), uint(pixel.y), 0x51ED270Bu);
   vec2 place = (vec2(pixel) + sample_r2(uvec3(pixel, 7u), sample_index)) / vec2(size) * 2.0 - 1.0;
   vec3 across = view_info[1].xyz * place.x + view_info[2].xyz * place.y;
   bool orthographic = view_info[0].w != 0.0;

@@ -51,7 +51,9 @@ def test_few_panoramas_are_scaled_to_all_locations_and_marked(bench):
 def test_more_texels_of_the_same_renderer_are_more_exact(bench):
     """32×16 panoramas are too coarse for the gallery's lamps: an error that mixes up rows or nodes would not see it."""
     summary, _, _ = bench
-    coarse, fine = (next(row for row in summary["rows"] if row["setting"].startswith(size)) for size in ("32×16", "128×64"))
+    coarse, fine = (
+        next(row for row in summary["rows"] if row["setting"].startswith(size)) for size in ("32×16", "128×64")
+    )
     assert fine["error"]["relative_rms"] < 0.1
     assert fine["seconds"] > coarse["seconds"]
     assert summary["reference"]["noise"] < 0.1 and summary["reference"]["floor"]["relative_rms"] < 0.05
@@ -88,8 +90,17 @@ def test_eevee_bakes_the_same_volume_or_says_why_not(run_gridlight):
     assert all(row["error"] is None for row in summary["rows"]) and summary["reference"] is None
 
 
-@pytest.mark.parametrize("arguments", [("--panoramas", "0"), ("--error-nodes", "0"), ("--limit", "nan"), ("--face", "1"),
-                                       ("--eevee-samples", "-1"), ("-o", "/dev/null/x")])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--panoramas", "0"),
+        ("--error-nodes", "0"),
+        ("--limit", "nan"),
+        ("--face", "1"),
+        ("--eevee-samples", "-1"),
+        ("-o", "/dev/null/x"),
+    ],
+)
 def test_wrong_options_are_refused_before_anything_runs(run_gridlight, arguments):
     done = run_gridlight("bench", "peers", *arguments)
     assert done.returncode == 2
