@@ -95,9 +95,9 @@ class _Bench:
         self._irradiance: list[np.ndarray | None] = []  # (N, 6, 3) per row
 
     def child(self, request: dict) -> tuple[dict, list[dict]]:
-        """Runs one measurement. Returns (its reports merged, with "problem" where it ended early; those that are rows)."""
-        options = ["--quiet"] * self._args.quiet
+        """Runs one measurement. Returns (its reports merged, "problem" where it ended early; those that are rows)."""
         args = self._args
+        options = ["--quiet"] if args.quiet else []
         reports, problem = bench_process.measure_in_child(request, args.limit, options, args.in_blender, args.verbose)
         merged = {}
         for report in reports:
@@ -130,7 +130,7 @@ class _Bench:
         return merged, rows
 
     def errors(self, nodes: list, samples: int, bands: int) -> dict | None:
-        """Fills "error" of the rows whose irradiance is known; returns what is known of the reference, None without one."""
+        """Fills "error" of the rows whose irradiance is known. Returns the reference's own figures, or None."""
         self._reporter.note(f"reference at {len(nodes)} nodes")
         merged, _ = self.child({"peer": "reference", "nodes": nodes, "samples": samples, "bands": bands})
         if "series" not in merged:

@@ -70,10 +70,10 @@ def _bars(summary: dict, rows: list[dict]) -> str:
     parts = _time_axis(scale, _TOP, bottom)
     for index, row in enumerate(rows):
         top = _TOP + 28 * index + 5
-        end = scale(row["seconds"])
+        end, colour = scale(row["seconds"]), _COLOURS[row["peer"]]
         parts.append(
             f'<text x="{names_end - 8}" y="{top + 14}" text-anchor="end">{escape(_name(row))}</text>'
-            f'<rect x="{names_end}" y="{top}" width="{max(end - names_end, 1):.1f}" height="19" fill="{_COLOURS[row["peer"]]}"/>'
+            f'<rect x="{names_end}" y="{top}" width="{max(end - names_end, 1):.1f}" height="19" fill="{colour}"/>'
             f'<text x="{end + 6:.1f}" y="{top + 14}">{significant(row["seconds"])} s</text>'
         )
     return _page(summary, height, "time to light all locations", parts)
@@ -94,7 +94,8 @@ def _error_over_time(summary: dict, rows: list[dict]) -> str:
             f'<text x="{_LEFT - 8}" y="{up(value) + 4:.1f}" text-anchor="end">{label}</text>'
         )
     parts.append(
-        f'<text transform="translate(18 {(_TOP + bottom) / 2}) rotate(-90)" text-anchor="middle">error, % relative RMS</text>'
+        f'<text transform="translate(18 {(_TOP + bottom) / 2}) rotate(-90)" text-anchor="middle">'
+        "error, % relative RMS</text>"
     )
     if floor > 0:
         parts.append(
@@ -119,7 +120,7 @@ def _error_over_time(summary: dict, rows: list[dict]) -> str:
     for index, peer in enumerate(dict.fromkeys(row["peer"] for row in rows)):
         left = _WIDTH - _RIGHT - 150 * (index + 1)
         parts.append(
-            f'<circle cx="{left}" cy="14" r="6" fill="{_COLOURS[peer]}"/>'
+            f'<rect x="{left - 6}" y="8" width="12" height="12" fill="{_COLOURS[peer]}"/>'
             f'<text x="{left + 11}" y="18">{escape(peer)}</text>'
         )
     return _page(summary, height, "error over time to light all locations", parts)
@@ -150,7 +151,8 @@ def _page(summary: dict, height: int, title: str, parts: list[str]) -> str:
     heading = escape(f"Gallery, {scene['locations']} locations: {title}")
     device = escape(f"{summary['device']}; {summary['machine']['cores']} CPU cores; Blender {summary['blender']}")
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {height}" font-family="sans-serif" font-size="13" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {height}" width="{_WIDTH}" height="{height}" '
+        'font-family="sans-serif" font-size="13" '
         f'fill="{_INK}"><title>{heading}</title><rect width="100%" height="100%" fill="#ffffff"/>'
         f'<text x="14" y="18" font-weight="bold">{heading}</text><text x="14" y="34" font-size="11">{device}</text>'
         f"{''.join(parts)}</svg>\n"

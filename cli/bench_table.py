@@ -22,7 +22,8 @@ def _head(summary: dict) -> list[str]:
         f"scene     gallery, {scene['triangles']} triangles, {scene['locations']} locations "
         f"({'×'.join(map(str, scene['resolution']))})",
         f"our bake  {probes['active']} active, {probes['culled']} culled, {probes['invalid']} invalid; "
-        f"{bake['iterations']} iterations, {'converged' if bake['converged'] else 'NOT converged'}; capture {bake['capture']}",
+        f"{bake['iterations']} iterations, {'converged' if bake['converged'] else 'NOT converged'}; "
+        f"capture {bake['capture']}",
     ]
     load = machine["load_before"]
     if load is not None and load > _LOADED * machine["cores"]:
@@ -69,9 +70,9 @@ def _notes(summary: dict) -> list[str]:
     if reference:
         size = f"{reference['width']}×{reference['height']}"
         lines += [
-            f"Error: relative RMS of irradiance at {reference['nodes']} free nodes, six normals, against Cycles {size},",
+            f"Error: relative RMS of irradiance at {reference['nodes']} free nodes, 6 normals, against Cycles {size},",
             f"{reference['seeds']} × {reference['samples']} samples, whose noise is {100 * reference['noise']:.2f} %. "
-            f"No {reference['bands']}-band probe can do better than {100 * reference['floor']['relative_rms']:.2f} %.",
+            f"A perfect {reference['bands']}-band probe has {100 * reference['floor']['relative_rms']:.2f} %.",
             "EEVEE's probes cannot be read.",
         ]
     lines += ["", "Seconds by phase"]

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``bench peers`` end to end with tiny settings: its rows, its JSON, its files, and peers that fail without ending the rest."""
+"""``bench peers`` end to end with tiny settings: rows, JSON, files, and peers that fail without ending the rest."""
 
 import json
 from xml.etree import ElementTree
 
 import pytest
+from gridlight.cli import bench_process
 
 TINY = ("bench", "peers", "--panoramas", 2, "--face", 4, "--tolerance", 0.1, "--quiet")
 
@@ -75,6 +76,15 @@ def test_our_own_bake_past_its_limit_ends_the_bench(run_gridlight):
     assert done.returncode == 2
     assert "not done after 1 s" in done.stderr and "our own bake" in done.stderr
     assert done.stdout == ""
+
+
+@pytest.mark.parametrize(
+    ("peer", "limit_s", "reason"), [("cycles", 0.3, "not done after 0.3 s"), ("nonsense", 60, "ended with status 1")]
+)
+def test_a_process_that_hangs_or_fails_leaves_a_reason(peer, limit_s, reason):
+    request = {"peer": peer, "panorama": [64, 32, 8], "panoramas": None, "nodes": [], "bands": 3}
+    reports, problem = bench_process.measure_in_child(request, limit_s, ["--quiet"], in_blender=False, verbose=False)
+    assert reports == [] and reason in problem
 
 
 def test_eevee_bakes_the_same_volume_or_says_why_not(run_gridlight):
