@@ -123,7 +123,7 @@ def _error_over_time(summary: dict, rows: list[dict]) -> str:
             f'<rect x="{left - 6}" y="8" width="12" height="12" fill="{_COLOURS[peer]}"/>'
             f'<text x="{left + 11}" y="18">{escape(peer)}</text>'
         )
-    return _page(summary, height, "error over time to light all locations", parts)
+    return _page(summary, height, "error over time", parts)
 
 
 class _Labels:
