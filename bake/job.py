@@ -126,9 +126,14 @@ def bake_steps(
         result.notes.append(f"{moved} probes in or behind walls were moved out, at most half a cell")
         shares = backend.read_shares()
     with _timed(result, "capture"):
-        state[nodes[inside_solid(shares)]] = INVALID
-        if not (state == ACTIVE).any():
-            raise InputError(f"{grid.name}: every probe sits inside solid geometry; move or enlarge the volume")
+        inside = inside_solid(shares)
+        if inside.all():
+            result.warnings.append(
+                f"{grid.name}: every probe sees mostly back faces without light; they are baked all the same. Flip the "
+                "normals of what surrounds the volume, or move it out of solid geometry"
+            )
+        else:
+            state[nodes[inside]] = INVALID
         backend.set_states(state)
 
     reporter.phase("light")

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-_LIT_SHARE = 0.1  # of the back faces seen: less is a light leak
+_LIT_SHARE = 0.02  # of the back faces seen: a spot lights little of a room, less than this is a leak of light
 _MOST = 0.5  # of the sphere
 _OPEN_SHARE = 0.01  # of a probe's directions that see background: the inside of a solid sees none
 
