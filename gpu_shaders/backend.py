@@ -27,7 +27,7 @@ from .scene_textures import SceneTextures
 from .textures import allocate, layers, read, upload
 
 _GROUP = 64  # threads that share a probe where its texels are summed
-_EMITTER_SAMPLES = 2048  # points on emitters that each probe looks at besides its texels
+_EMITTER_SAMPLES = 1024  # points on emitters that each probe looks at besides its texels
 # Kept images of texel surfaces. Albedo is 32 bit: in a bright room an error of 1e-4 in 0.99 is one of 1e-2 in the
 # light.
 _SURFACE_FORMATS = {
