@@ -54,12 +54,18 @@ class ShellVote:
         """``sightings`` (P, S): per probe ±(object + 1) of S directions, negative from behind, half a unit farther
         from zero where lit; 0 background."""
         size = np.abs(sightings)
-        behind = sightings < 0
+        seen = sightings != 0
         item = np.floor(size).astype(np.int64) - 1
-        self._any_light |= bool(((size > item + 1.25) | (sightings == 0)).any())
-        open_ = (sightings == 0).mean(axis=1) >= _OPEN_SHARE
-        lit = behind & ((size > item + 1.25) | open_[:, None])
-        self._behind += np.bincount(item[behind], minlength=len(self._behind))
+        open_ = (~seen).mean(axis=1) >= _OPEN_SHARE
+        lit = (size > item + 1.25) | open_[:, None]
+        self._any_light |= bool(((size > item + 1.25) | ~seen).any())
+        probe = np.broadcast_to(np.arange(len(sightings))[:, None], sightings.shape)
+        # A probe in front of an object may hit the far side of an edge; only those that see mostly back faces count.
+        pair, inverse = np.unique(probe[seen] * len(self._behind) + item[seen], return_inverse=True)
+        mostly_behind = np.bincount(inverse, np.sign(sightings[seen]), len(pair))[inverse] < 0
+        from_behind = mostly_behind & (sightings[seen] < 0)
+        item, lit = item[seen][from_behind], lit[seen][from_behind]
+        self._behind += np.bincount(item, minlength=len(self._behind))
         self._lit += np.bincount(item[lit], minlength=len(self._lit))
 
     def shells(self) -> np.ndarray:
