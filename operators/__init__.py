@@ -6,17 +6,21 @@ _unregister = []
 
 def _classes() -> tuple:
     """Every operator, in the order of registration. Imported here, because the package must load without Blender."""
-    from .place_probes import GRIDLIGHT_OT_clear_probes, GRIDLIGHT_OT_place_probes
+    from . import place_probes
 
-    return GRIDLIGHT_OT_place_probes, GRIDLIGHT_OT_clear_probes
+    return place_probes.classes
 
 
 def register():
     import bpy
 
-    enter, leave = bpy.utils.register_classes_factory(_classes())
+    from . import properties
+
+    enter, leave = bpy.utils.register_classes_factory((*properties.classes, *_classes()))
     enter()
     _unregister.append(leave)
+    properties.attach()
+    _unregister.append(properties.detach)
 
 
 def unregister():

@@ -17,7 +17,7 @@ from .notices import Notices
 from .shader_nodes import NodeEvaluator
 from .surface_shaders import evaluate_shader
 
-ROLE_PROPERTY, GROUP_PROPERTY = "gridlight_role", "gridlight_group"
+ROLE_PROPERTY, GROUP_PROPERTY, INTENSITY_PROPERTY = "gridlight_role", "gridlight_group", "gridlight_intensity"
 
 
 class LightTable:
@@ -57,6 +57,7 @@ def _read_light(item, matrix, name, node_tint, notices) -> Light | None:
     if not item.visible_diffuse or (data.type == "AREA" and data.cycles.is_portal):
         return None
     color = np.array(data.color, float) * data.energy * 2.0**data.exposure * node_tint
+    color *= float(item.get(INTENSITY_PROPERTY, 1.0))
     if data.use_temperature:
         color *= np.array(data.temperature_color, float)
     frame, scale = _frame(matrix)

@@ -9,10 +9,20 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ..core.settings import MAX_RESOLUTION
 from ..core.snapshot import Volume
 from .volume_fit import fit_volume, fitted_bounds
 
-__all__ = ["create_volume", "find_volumes", "fit_volume", "fitted_bounds"]
+__all__ = [
+    "box_of",
+    "create_volume",
+    "find_volumes",
+    "fit_volume",
+    "fitted_bounds",
+    "is_volume",
+    "resolution_for",
+    "resolution_of",
+]
 
 MARK, RESOLUTION = "gridlight_volume", "gridlight_resolution"
 
@@ -23,14 +33,34 @@ def find_volumes(scene: bpy.types.Scene) -> list[Volume]:
     The Empty's box is its display size, a cube of half edge ``empty_display_size``, through its world transform.
     Volumes may be hidden; a bake reads them all the same.
     """
-    volumes = []
-    for item in sorted(scene.objects, key=lambda item: item.name):
-        if item.type == "EMPTY" and item.get(MARK):
-            matrix = np.array(item.matrix_world, float)
-            matrix[:3, :3] *= item.empty_display_size
-            resolution = tuple(int(count) for count in item.get(RESOLUTION, (2, 2, 2)))
-            volumes.append(Volume(item.name, matrix, resolution))
-    return volumes
+    return [
+        Volume(item.name, box_of(item), resolution_of(item))
+        for item in sorted(scene.objects, key=lambda item: item.name)
+        if is_volume(item)
+    ]
+
+
+def is_volume(item: bpy.types.Object | None) -> bool:
+    """Whether ``item`` is an Empty marked as a probe volume."""
+    return item is not None and item.type == "EMPTY" and bool(item.get(MARK))
+
+
+def box_of(item: bpy.types.Object) -> np.ndarray:
+    """(4, 4) float64 that maps the box −1..1 to the volume's place in the world, parents and animation included."""
+    matrix = np.array(item.matrix_world, float)
+    matrix[:3, :3] *= item.empty_display_size
+    return matrix
+
+
+def resolution_of(item: bpy.types.Object) -> tuple[int, int, int]:
+    """Probes along the volume's own axes."""
+    return tuple(int(count) for count in item.get(RESOLUTION, (2, 2, 2)))
+
+
+def resolution_for(box: np.ndarray, spacing: float) -> tuple[int, int, int]:
+    """Probes per axis whose distance comes nearest to ``spacing`` metres in ``box`` (4, 4)."""
+    cells = np.rint(2 * np.linalg.norm(box[:3, :3], axis=0) / spacing)
+    return tuple(int(count) for count in np.clip(cells + 1, 2, MAX_RESOLUTION))
 
 
 def create_volume(scene: bpy.types.Scene, name: str, matrix: np.ndarray, resolution: Sequence[int]) -> bpy.types.Object:
