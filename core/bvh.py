@@ -52,7 +52,7 @@ def build(triangles: np.ndarray) -> Hierarchy:
     """Builds the hierarchy of ``triangles`` (T, 3, 3) float32, T ≥ 1, in the frame that the rays will use."""
     triangles = np.asarray(triangles, np.float32)
     low, high = triangles.min(axis=1), triangles.max(axis=1)
-    order = np.argsort(_morton_codes((low + high) * np.float32(0.5)), kind="stable")
+    order = np.argsort(morton_codes((low + high) * np.float32(0.5)), kind="stable")
     tree = _merge(low[order].T.copy(), high[order].T.copy())
     return _flatten(tree, order)
 
@@ -68,7 +68,7 @@ class _BinaryTree:
     batches: list[tuple[int, int]]  # index ranges of inner nodes made together; nodes of one batch are independent
 
 
-def _morton_codes(points: np.ndarray) -> np.ndarray:
+def morton_codes(points: np.ndarray) -> np.ndarray:
     """(T,) uint64 codes of ``points`` (T, 3), 21 bits an axis over a cube around them all."""
     low = points.min(axis=0)
     extent = float((points.max(axis=0) - low).max()) or 1.0
