@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A person in front of Blender: eyes (pictures, text on the screen) and hands (mouse, keys, operators).
+
+Screen coordinates have their origin at the top left, as X has them; Blender's own have it at the bottom left.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+EXTENSION = "bl_ext.user_default.gridlight"
+READING_SCALE = 3  # letters of the interface are 11 pixels high; text recognition wants about 30
+REACTION_SECONDS = 0.25  # between a click and what it shows
+
+
+@dataclass(frozen=True)
+class Rectangle:
+    """Pixels of the screen, origin top left."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+    @property
+    def center(self) -> tuple[int, int]:
+        return self.x + self.width // 2, self.y + self.height // 2
+
+
+class Person:
+    """Plays one scenario. ``clicks`` counts what the person did with the mouse."""
+
+    def __init__(self, scenario: str):
+        self._scenario = scenario
+        self._handlers = _gridlight_handlers()
+        self.clicks = 0
+
+    # Blender's side
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def module(self, name: str = ""):
+        """A module of the installed extension, ``module("bake.job")``; its root without a name."""
+        import importlib
+
+        return importlib.import_module(f"{EXTENSION}.{name}" if name else EXTENSION)
+
+    @property
+    def window(self) -> bpy.types.Window:
+        return bpy.context.window_manager.windows[0]
+
+    def area(self, kind: str = "VIEW_3D") -> bpy.types.Area:
+        """The largest area of its kind."""
+        areas = [area for area in self.window.screen.areas if area.type == kind]
+        return max(areas, key=lambda area: area.width * area.height)
+
+    def region(self, kind: str = "WINDOW", area: bpy.types.Area | None = None) -> bpy.types.Region:
+        area = area or self.area()
+        return next(region for region in area.regions if region.type == kind)
+
+    @contextlib.contextmanager
+    def at_viewport(self) -> Iterator[None]:
+        """``bpy.ops`` as if called with the mouse over the 3D viewport."""
+        area = self.area()
+        with bpy.context.temp_override(window=self.window, area=area, region=self.region("WINDOW", area)):
+            yield
+
+    def do(self, operator: str, invoke: bool = False, **options) -> set[str]:
+        """Calls an operator over the 3D viewport, ``do("gridlight.bake", invoke=True)`` as a button would."""
+        module, name = operator.split(".")
+        call = getattr(getattr(bpy.ops, module), name)
+        with self.at_viewport():
+            if invoke:
+                return call("INVOKE_DEFAULT", **options)
+            return call("EXEC_DEFAULT", True, **options)  # True: an undo step, as from the interface
+
+    def show_sidebar(self, category: str | None = "Gridlight") -> None:
+        """Opens the 3D viewport's sidebar at a tab, wide enough to read."""
+        area = self.area()
+        area.spaces.active.show_region_ui = True
+        area.tag_redraw()
+        self._category = category
+
+    def open_tab(self, category: str = "Gridlight") -> Iterator[float]:
+        """Opens the sidebar and brings its tab ``category`` to the front."""
+        self.show_sidebar()
+        yield REACTION_SECONDS
+        self.region("UI").active_panel_category = category
+        self.area().tag_redraw()
+        yield REACTION_SECONDS
+
+    # Eyes
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def look(self, rectangle: Rectangle | None = None) -> np.ndarray:
+        """What the screen shows, (height, width, 3) uint8 sRGB, row 0 at the top."""
+        command = ["import", "-silent", "-window", "root"]
+        if rectangle:
+            command += ["-crop", f"{rectangle.width}x{rectangle.height}+{rectangle.x}+{rectangle.y}", "+repage"]
+        raw = subprocess.run([*command, "-depth", "8", "ppm:-"], capture_output=True, check=True).stdout
+        header = re.match(rb"P6\s+(\d+)\s+(\d+)\s+255\s", raw)
+        width, height = int(header[1]), int(header[2])
+        return np.frombuffer(raw, np.uint8, offset=header.end()).reshape(height, width, 3)
+
+    def picture(self, name: str, rectangle: Rectangle | None = None) -> Path:
+        """Keeps what the screen shows as ``<scenario>-<name>.png`` among the test's pictures."""
+        folder = Path(os.environ["GRIDLIGHT_PICTURES"])
+        path = folder / f"{self._scenario}-{name}.png"
+        command = ["import", "-silent", "-window", "root"]
+        if rectangle:
+            command += ["-crop", f"{rectangle.width}x{rectangle.height}+{rectangle.x}+{rectangle.y}", "+repage"]
+        subprocess.run([*command, str(path)], check=True)
+        return path
+
+    def rectangle(self, region: bpy.types.Region | None = None) -> Rectangle:
+        """Where a region is on the screen; by default the 3D viewport's."""
+        region = region or self.region()
+        return Rectangle(region.x, self.window.height - region.y - region.height, region.width, region.height)
+
+    def read(self, rectangle: Rectangle) -> list[tuple[str, Rectangle]]:
+        """Words on the screen and where they stand, in reading order."""
+        picture = ["import", "-silent", "-window", "root"]
+        picture += ["-crop", f"{rectangle.width}x{rectangle.height}+{rectangle.x}+{rectangle.y}", "+repage"]
+        picture += ["-colorspace", "gray", "-negate", "-resize", f"{100 * READING_SCALE}%", "png:-"]
+        image = subprocess.run(picture, capture_output=True, check=True).stdout
+        reading = ["tesseract", "-", "-", "--psm", "11", "--dpi", "300", "tsv"]
+        lines = subprocess.run(reading, input=image, capture_output=True, check=True).stdout.decode().splitlines()[1:]
+        words = []
+        for line in lines:
+            fields = line.split("\t")
+            if len(fields) == 12 and fields[11].strip():
+                x, y, width, height = (int(value) // READING_SCALE for value in fields[6:10])
+                words.append((fields[11].strip(), Rectangle(rectangle.x + x, rectangle.y + y, width, height)))
+        return words
+
+    def find(self, text: str, rectangle: Rectangle) -> Rectangle | None:
+        """Where the words of ``text`` stand in a row on the screen."""
+        wanted = text.split()
+        words = self.read(rectangle)
+        for start in range(len(words) - len(wanted) + 1):
+            row = words[start : start + len(wanted)]
+            if all(_alike(word, seen) for word, (seen, _) in zip(wanted, row)):
+                first, last = row[0][1], row[-1][1]
+                return Rectangle(first.x, first.y, last.x + last.width - first.x, first.height)
+        return None
+
+    # Hands
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def move(self, x: int, y: int) -> None:
+        subprocess.run(["xdotool", "mousemove", str(x), str(y)], check=True)
+
+    def click(self, x: int, y: int, button: int = 1) -> Iterator[float]:
+        """Moves there and clicks, with a moment for Blender to notice each."""
+        self.clicks += 1
+        # Blender takes no notice of a button when the mouse has not moved a little before.
+        self.move(x - 1, y)
+        yield REACTION_SECONDS / 2
+        self.move(x, y)
+        yield REACTION_SECONDS / 2
+        subprocess.run(["xdotool", "click", str(button)], check=True)
+        yield REACTION_SECONDS
+
+    def click_text(self, text: str, rectangle: Rectangle | None = None) -> Iterator[float]:
+        """Reads the screen until ``text`` is found and clicks it. By default in the 3D viewport's sidebar."""
+        rectangle = rectangle or self.rectangle(self.region("UI"))
+        place = self.find(text, rectangle)
+        if place is None:
+            self.picture("unread")
+            seen = " ".join(word for word, _ in self.read(rectangle))
+            raise AssertionError(f"'{text}' is not on the screen at {rectangle}; what is: {seen}")
+        yield from self.click(*place.center)
+
+    def key(self, *keys: str) -> Iterator[float]:
+        """Presses keys by their X names, "Escape" or "ctrl+z", with the mouse over the 3D viewport."""
+        self.move(*self.rectangle().center)
+        yield REACTION_SECONDS / 2
+        for key in keys:
+            subprocess.run(["xdotool", "key", key], check=True)
+            yield REACTION_SECONDS
+
+    def hold(self, key: str, seconds: float) -> Iterator[float]:
+        """Holds a key down."""
+        self.move(*self.rectangle().center)
+        yield REACTION_SECONDS / 2
+        subprocess.run(["xdotool", "keydown", key], check=True)
+        yield seconds
+        subprocess.run(["xdotool", "keyup", key], check=True)
+        yield REACTION_SECONDS
+
+    def wait_until(self, condition, what: str, seconds: float = 30.0, step: float = 0.1) -> Iterator[float]:
+        """Waits until ``condition()`` holds."""
+        waited = 0.0
+        while not condition():
+            if waited > seconds:
+                raise AssertionError(f"waited {seconds:.0f} s in vain for {what}")
+            waited += step
+            yield step
+
+    # Afterwards
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def check_nothing_leaked(self) -> None:
+        """No handler more than before, and no operator still running."""
+        assert _gridlight_handlers() == self._handlers, (self._handlers, _gridlight_handlers())
+        running = [
+            operator.bl_idname
+            for window in bpy.context.window_manager.windows
+            for operator in window.modal_operators
+            if operator.bl_idname.startswith("GRIDLIGHT_")
+        ]
+        assert not running, running
+
+
+def _alike(wanted: str, seen: str) -> bool:
+    """Equal but for what surrounds a word: arrows and check boxes are read as letters beside it."""
+    return wanted.casefold() == seen.strip("|[](){}<>.,:;'\"“”‘’«»_-=~*°").casefold()
+
+
+def _gridlight_handlers() -> dict[str, int]:
+    """How many application handlers of the extension there are, by list."""
+    counts = {}
+    for name in dir(bpy.app.handlers):
+        handlers = getattr(bpy.app.handlers, name)
+        if isinstance(handlers, list):
+            own = sum(getattr(handler, "__module__", "").startswith(EXTENSION) for handler in handlers)
+            if own:
+                counts[name] = own
+    return counts

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs inside Blender (``blender -P server.py -- --gridlight-test-server FOLDER EXTENSION.zip``): waits for scenarios.
+
+Installs the extension, says that it is ready, then takes ``task<N>.json`` files from FOLDER one by one, runs the
+scenario that each names, from a timer so that Blender lives on, and answers with ``answer<N>.json``.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+import traceback
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from person import EXTENSION, Person  # noqa: E402  (beside this file, which is no package)
+
+POLL_SECONDS = 0.05
+SETTLE_SECONDS = 0.3  # after loading a file: time for its windows to be drawn
+
+
+class Server:
+    """Drives one scenario at a time."""
+
+    def __init__(self, folder: Path):
+        self._folder = folder
+        self._serial = 0
+        self._scenario = None
+
+    def __call__(self) -> float:
+        """The timer: one step of the running scenario, or a look for the next."""
+        if self._scenario is None:
+            task = self._folder / f"task{self._serial + 1}.json"
+            if not task.exists():
+                return POLL_SECONDS
+            self._serial += 1
+            self._scenario = _scenario(**json.loads(task.read_text()))
+        failure = ""
+        try:
+            return max(float(next(self._scenario)), 0.0)
+        except StopIteration:
+            pass
+        except Exception:  # whatever a scenario raises is its failure and goes to pytest
+            failure = traceback.format_exc()
+        self._scenario = None
+        _write(self._folder / f"answer{self._serial}.json", {"failure": failure})
+        return POLL_SECONDS
+
+
+def _scenario(file: str, name: str):
+    """A fresh file, the scenario, and what must hold after each."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    yield SETTLE_SECONDS
+    spec = importlib.util.spec_from_file_location(Path(file).stem, file)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    person = Person(name)
+    try:
+        yield from getattr(module, name)(person)
+    except Exception:
+        person.picture("failure")
+        raise
+    person.check_nothing_leaked()
+
+
+def _write(path: Path, value: dict) -> None:
+    part = path.with_suffix(".part")
+    part.write_text(json.dumps(value))
+    part.replace(path)
+
+
+def _start() -> None:
+    folder, extension = sys.argv[sys.argv.index("--gridlight-test-server") + 1 :]
+    preferences = bpy.context.preferences
+    preferences.view.show_splash = False
+    preferences.view.ui_scale = 1.0
+    preferences.use_preferences_save = False
+    bpy.ops.extensions.package_install_files(filepath=extension, repo="user_default", enable_on_install=True)
+    if EXTENSION not in preferences.addons:
+        raise RuntimeError(f"{extension} did not install as {EXTENSION}")
+    bpy.app.timers.register(Server(Path(folder)), first_interval=SETTLE_SECONDS, persistent=True)
+    _write(Path(folder) / "ready.json", {})
+
+
+_start()

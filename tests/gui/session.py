@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A real Blender on a virtual screen that waits for scenarios; started once for many tests, again after a crash."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SERVER = Path(__file__).with_name("server.py")
+START_SECONDS = 180.0  # of the first start: the machine may be busy, and nothing is in its caches
+SCREEN = "1280x800"
+LOG_TAIL_LINES = 60
+
+
+def full_blender() -> list[str]:
+    """The command that runs things in the full Blender's folder, which it makes where it is missing."""
+    script = ROOT / "scripts" / "full_blender"
+    made = subprocess.run([script, "make"], capture_output=True, text=True, check=False)
+    if made.returncode:
+        pytest.fail(f"scripts/full_blender cannot make a Blender with a window:\n{made.stderr[-4000:]}")
+    return [str(script), "--dir", made.stdout.strip().splitlines()[-1]]
+
+
+def build_extension(command: list[str], folder: Path) -> Path:
+    """The extension's zip, built and validated by Blender itself."""
+    target = folder / "gridlight.zip"
+    build = ["shell", "blender", "--command", "extension", "build", "--source-dir", str(ROOT)]
+    done = subprocess.run(
+        [*command, *build, "--output-filepath", str(target)], capture_output=True, text=True, check=False
+    )
+    if done.returncode or not target.exists():
+        pytest.fail(f"the extension cannot be built:\n{done.stdout[-4000:]}{done.stderr[-4000:]}")
+    return target
+
+
+class BlenderSession:
+    """One backend's Blender. ``run`` starts it where it is not running."""
+
+    def __init__(self, command: list[str], backend: str, extension: Path, pictures: Path):
+        self._command = command
+        self._backend = backend
+        self._extension = extension
+        self._pictures = pictures
+        self._process: subprocess.Popen | None = None
+        self._folder: Path | None = None
+        self._serial = 0
+
+    def run(self, file: str, name: str, timeout: float) -> None:
+        """Runs scenario ``name`` of ``file`` and fails the test with what went wrong there."""
+        if self._process is None or self._process.poll() is not None:
+            self._start()
+        self._serial += 1
+        task = self._folder / f"task{self._serial}.json"
+        _write(task, {"file": file, "name": name})
+        answer = self._wait(self._folder / f"answer{self._serial}.json", timeout)
+        if answer["failure"]:
+            pytest.fail(
+                f"in Blender ({self._backend}):\n{answer['failure']}\npictures: {self._pictures}", pytrace=False
+            )
+
+    def stop(self) -> None:
+        """Ends Blender and its screen; the namespace that they live in takes everything with it."""
+        if self._process is not None:
+            if self._process.poll() is None:
+                os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.wait()
+            self._process = None
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+            self._folder = None
+
+    def _start(self) -> None:
+        self.stop()
+        self._folder = Path(tempfile.mkdtemp(prefix="gridlight-gui-"))
+        self._pictures.mkdir(parents=True, exist_ok=True)
+        environment = {
+            **os.environ,
+            "BLENDER_USER_RESOURCES": str(self._folder / "user"),
+            "TMPDIR": str(self._folder),
+            "GRIDLIGHT_PICTURES": str(self._pictures),
+        }
+        command = [*self._command, "run", "--backend", self._backend, "--size", SCREEN, "--factory-startup"]
+        command += ["--python-exit-code", "1", "-P", str(SERVER)]
+        command += ["--", "--gridlight-test-server", str(self._folder), str(self._extension)]
+        with (self._folder / "blender.log").open("w") as log:
+            self._process = subprocess.Popen(
+                command, stdout=log, stderr=subprocess.STDOUT, env=environment, start_new_session=True
+            )
+        self._wait(self._folder / "ready.json", START_SECONDS)
+
+    def _wait(self, answer: Path, timeout: float) -> dict:
+        deadline = time.monotonic() + timeout
+        while not answer.exists():
+            ended = self._process.poll() is not None
+            if ended or time.monotonic() > deadline:
+                what = f"ended with {self._process.returncode}" if ended else f"did not answer within {timeout:.0f} s"
+                log = (self._folder / "blender.log").read_text(errors="replace").splitlines()[-LOG_TAIL_LINES:]
+                self.stop()
+                pytest.fail(f"Blender ({self._backend}) {what}; its last words:\n" + "\n".join(log), pytrace=False)
+            time.sleep(0.05)
+        return json.loads(answer.read_text())
+
+
+def _write(path: Path, value: dict) -> None:
+    """Appears whole or not at all."""
+    part = path.with_suffix(".part")
+    part.write_text(json.dumps(value))
+    part.replace(path)
