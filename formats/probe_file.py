@@ -17,12 +17,9 @@ damage is. A file without ``digest`` is accepted: other programs may write one.
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-import io
 import json
 import os
-import sys
 
 import numpy as np
 
@@ -30,6 +27,8 @@ from ..core.conventions import ACTIVE, CULLED, DEPTH_EDGE, FORMAT_VERSION, INVAL
 from ..core.errors import InputError
 from ..core.field import Field
 from ..core.grid import Grid
+from . import openexr_file
+from .openexr_file import reason
 
 ATTRIBUTE = "gridlight"
 MAX_BYTES = 1 << 30  # of pixels; a reader that checks the header first never allocates more
@@ -99,14 +98,7 @@ def write(path, field: Field) -> None:
     text = _json(describe(field))
     document = {**json.loads(text), "digest": _digest(text, planes)}
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, ATTRIBUTE: _json(document)}
-    # OpenEXR reports every failure as RuntimeError with its own wording; opening the file first gives the system's.
-    with open(path, "wb"):
-        pass
-    try:
-        with _silent():
-            OpenEXR.File(header, dict(zip(names, planes))).write(os.fspath(path))
-    except RuntimeError as error:
-        raise OSError(None, f"writing failed: {_reason(error)}", str(path)) from None
+    openexr_file.write(path, header, dict(zip(names, planes)))
 
 
 def read(path) -> Field:
@@ -127,14 +119,13 @@ def read(path) -> Field:
     if magic != b"\x76\x2f\x31\x01":
         raise InputError(f"{path} is not an OpenEXR file; name a probes.exr that Gridlight wrote")
     try:
-        with _silent():
+        with openexr_file.silent():
             document, grid, bands = _check_header(path, OpenEXR.File(path, header_only=True).header())
             channels = OpenEXR.File(path, separate_channels=True).channels()
             planes = _gather(path, channels, grid, bands)
     except (RuntimeError, ValueError, TypeError, OverflowError, UnicodeDecodeError) as error:
         # What OpenEXR's binding raises for files that end early or contradict themselves.
-        reason = _reason(error)
-        raise InputError(f"{path} is truncated or damaged ({reason}); bake it again or restore a copy") from None
+        raise InputError(f"{path} is truncated or damaged ({reason(error)}); bake it again or restore a copy") from None
     _check_values(path, document, planes, bands)
     return _field(document, grid, bands, planes)
 
@@ -213,7 +204,7 @@ def _announced_grid(path: str, document: dict) -> tuple[Grid, int]:
         resolution = tuple(document["resolution"])
         bands = document["bands"]
     except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{path} is damaged: its description of the volume is incomplete ({_reason(error)})") from None
+        raise InputError(f"{path} is damaged: its description of the volume is incomplete ({reason(error)})") from None
     whole = all(type(number) is int for number in (*resolution, bands)) and 1 <= bands <= MAX_BANDS
     if matrix.shape != (4, 4) or len(resolution) != 3 or not whole or not isinstance(name, str):
         raise InputError(f"{path} is damaged: its volume, resolution or bands make no sense")
@@ -260,27 +251,3 @@ def _digest(text: str, planes: np.ndarray) -> str:
     digest = hashlib.sha256(text.encode())
     digest.update(np.ascontiguousarray(planes, "<f4"))
     return digest.hexdigest()
-
-
-def _reason(error: Exception) -> str:
-    return " ".join(str(error).split())[:200] or type(error).__name__
-
-
-@contextlib.contextmanager
-def _silent():
-    """OpenEXR raises its errors and prints them too, on both standard streams; the user gets one line, ours."""
-    null = os.open(os.devnull, os.O_WRONLY)
-    kept = {}
-    for descriptor, stream in ((1, sys.stdout), (2, sys.stderr)):
-        if stream is not None:  # None in Blender on Windows started without a console
-            stream.flush()
-            kept[descriptor] = os.dup(descriptor)
-            os.dup2(null, descriptor)
-    os.close(null)
-    try:
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-            yield
-    finally:
-        for descriptor, copy in kept.items():
-            os.dup2(copy, descriptor)
-            os.close(copy)

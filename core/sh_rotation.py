@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Spherical harmonics under rotations and reflections of space."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .cubemap import texel_directions
+from .spherical_harmonics import basis
+
+
+def rotation(matrix: np.ndarray, bands: int) -> np.ndarray:
+    """(bands², bands²) matrix that turns coefficients of L(d) into those of L(matrixᵀ d).
+
+    ``matrix`` (3, 3) is orthogonal, of either handedness: light that came from d then comes from matrix·d. Found by
+    evaluating the turned basis at more directions than it has functions and solving for the coefficients; every band is
+    closed under ``matrix``, so the solution is exact to rounding.
+    """
+    directions = texel_directions(4).reshape(-1, 3)
+    return np.linalg.lstsq(basis(directions, bands), basis(directions @ matrix, bands), rcond=None)[0]
+
+
+def rotate(coefficients: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """``coefficients`` (…, bands², C) of the light as it is after space was turned by ``matrix`` (3, 3); float64."""
+    bands = int(round(np.sqrt(coefficients.shape[-2])))
+    return np.einsum("kj,...jc->...kc", rotation(matrix, bands), coefficients, optimize=True)
