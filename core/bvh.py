@@ -14,12 +14,15 @@ Flat layout, one row of RGBA32F texels per node (``NODE_TEXELS``)::
     2 low z                       5 high z
 
 Empty slots have an inverted box and are never entered. Triangles are stored in leaf order, ``TRIANGLE_TEXELS`` texels
-each: three corners, the first one's w is 1 where the leaf ends.
+each: three corners, the first one's w is 1 where the leaf ends. Nodes are stored level by level from the root.
+
+When triangles move and stay as many, the tree is kept and only its boxes are made anew (``refit``), which is cheaper.
+What moved far or apart stretches boxes over what lies between; ``stretched`` tells when building again is better.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,6 +31,7 @@ TRIANGLE_TEXELS = 3
 WIDTH = 4
 LEAF_SIZE = 2  # triangles; 1, 2, 4 and 8 are compared in docs/measurements.md
 SEARCH_RADIUS = 8  # neighbours looked at on each side in Morton order
+MOST_STRETCH = 1.3  # how much dearer rays may get before building again pays, see docs/measurements.md
 _BLOCK = 1 << 14  # clusters per pass: keeps the working set in cache
 _EMPTY = np.float32(3e38)
 
@@ -38,14 +42,18 @@ class Hierarchy:
 
     ``nodes`` is (N, NODE_TEXELS, 4) float32, ``order`` (T,) int64 maps leaf order to the caller's triangles,
     ``leaf_end`` (T,) bool marks the last triangle of each leaf, ``stack_size`` is the most entries that a traversal
-    can have pending. ``cost`` is the surface-area cost of the tree: expected node and triangle tests of a random ray.
+    can have pending. ``levels`` (D + 1,) are the first nodes of each level, and N. ``cost`` is the surface-area cost of
+    the tree: expected node and triangle tests of a random ray that enters it; ``extent`` half the surface of the box
+    around it, so that cost · extent compares trees that fill different boxes.
     """
 
     nodes: np.ndarray
     order: np.ndarray
     leaf_end: np.ndarray
     stack_size: int
+    levels: tuple[int, ...]
     cost: float
+    extent: float
 
 
 def build(triangles: np.ndarray) -> Hierarchy:
@@ -55,6 +63,93 @@ def build(triangles: np.ndarray) -> Hierarchy:
     order = np.argsort(morton_codes((low + high) * np.float32(0.5)), kind="stable")
     tree = _merge(low[order].T.copy(), high[order].T.copy())
     return _flatten(tree, order)
+
+
+def refit(
+    hierarchy: Hierarchy, triangles: np.ndarray, changed: np.ndarray | None = None
+) -> tuple[Hierarchy, np.ndarray]:
+    """The same tree with boxes around ``triangles`` (T, 3, 3) float32, which count as when it was built.
+
+    ``changed`` (T,) bool are those that may differ, all by default. Order, leaves and children stay as they were.
+    Returns the tree and the nodes (K,), ascending, whose boxes were made anew: only they and the corners of changed
+    triangles have to be sent again.
+    """
+    child = hierarchy.nodes[:, NODE_TEXELS - 1].astype(np.int64)
+    used = hierarchy.nodes[:, 0] <= hierarchy.nodes[:, 3]
+    leaf_slot = np.flatnonzero(used & (child < 0))
+    parent_slot = np.concatenate([[0], np.flatnonzero(used & (child >= 0))])  # of each node: they are numbered so
+    first = -1 - child.ravel()[leaf_slot]
+    if changed is not None:
+        run_starts = np.flatnonzero(np.concatenate([[True], hierarchy.leaf_end[:-1]]))
+        in_run = np.zeros(len(hierarchy.order), bool)
+        in_run[run_starts] = np.logical_or.reduceat(changed[hierarchy.order], run_starts)
+        leaf_slot, first = leaf_slot[in_run[first]], first[in_run[first]]
+    nodes = hierarchy.nodes.copy()
+    low, high = _leaf_boxes(np.asarray(triangles, np.float32), hierarchy, first)
+    nodes[leaf_slot // WIDTH, 0:3, leaf_slot % WIDTH] = low
+    nodes[leaf_slot // WIDTH, 3:6, leaf_slot % WIDTH] = high
+    fresh = np.zeros(len(nodes), bool)
+    fresh[leaf_slot // WIDTH] = True
+    for start, stop in reversed(list(zip(hierarchy.levels[1:], hierarchy.levels[2:]))):
+        node = start + np.flatnonzero(fresh[start:stop])
+        boxes, parent = nodes[node], parent_slot[node]  # empty slots are inverted and take no part in a minimum
+        nodes[parent // WIDTH, 0:3, parent % WIDTH] = _fold(np.minimum, boxes[:, 0:3].transpose(2, 0, 1))
+        nodes[parent // WIDTH, 3:6, parent % WIDTH] = _fold(np.maximum, boxes[:, 3:6].transpose(2, 0, 1))
+        fresh[parent // WIDTH] = True
+    fresh = np.flatnonzero(fresh)
+    before, after = (_weighted_surface(rows[fresh], hierarchy.leaf_end) for rows in (hierarchy.nodes, nodes))
+    extent = _extent(nodes)
+    surface = (hierarchy.cost - 1.0) * hierarchy.extent + after - before
+    return replace(hierarchy, nodes=nodes, cost=1.0 + surface / max(extent, 1e-300), extent=extent), fresh
+
+
+def _leaf_boxes(triangles: np.ndarray, hierarchy: Hierarchy, first: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Low and high corners (K, 3) of the leaves that start at ``first`` (K,)."""
+    corners = triangles[hierarchy.order[first]]
+    low, high = _fold(np.minimum, corners.transpose(1, 0, 2)), _fold(np.maximum, corners.transpose(1, 0, 2))
+    open_ = np.flatnonzero(~hierarchy.leaf_end[first])
+    index = first[open_]
+    while len(open_):
+        index = index + 1
+        corners = triangles[hierarchy.order[index]]
+        low[open_] = np.minimum(low[open_], _fold(np.minimum, corners.transpose(1, 0, 2)))
+        high[open_] = np.maximum(high[open_], _fold(np.maximum, corners.transpose(1, 0, 2)))
+        more = ~hierarchy.leaf_end[index]
+        open_, index = open_[more], index[more]
+    return low, high
+
+
+def _fold(function: np.ufunc, parts: np.ndarray) -> np.ndarray:
+    """``function`` over the short first axis; numpy's own reduction is slow over a few elements."""
+    result = function(parts[0], parts[1])
+    for part in parts[2:]:
+        function(result, part, out=result)
+    return result
+
+
+def stretched(refitted: Hierarchy, built: Hierarchy) -> bool:
+    """Has refitting made rays so much dearer than when the tree was ``built`` that it should be built again?"""
+    return refitted.cost * refitted.extent > MOST_STRETCH * built.cost * built.extent
+
+
+def _weighted_surface(nodes: np.ndarray, leaf_end: np.ndarray) -> float:
+    """Sum over the children of ``nodes`` (K, …) of half their surface, for leaves times their triangles."""
+    low, high, child = nodes[:, 0:3], nodes[:, 3:6], nodes[:, NODE_TEXELS - 1]
+    node, slot = np.nonzero(low[:, 0] <= high[:, 0])
+    area = _half_area(low[node, :, slot].T, high[node, :, slot].T)
+    last = -1 - child[node, slot].astype(np.int64)
+    total = float(area.sum())
+    area, last = area[last >= 0], last[last >= 0]
+    while len(last):  # once more for every further triangle of a leaf
+        more = ~leaf_end[last]
+        area, last = area[more], last[more] + 1
+        total += float(area.sum())
+    return total
+
+
+def _extent(nodes: np.ndarray) -> float:
+    """Half the surface of the box around the root's children."""
+    return float(_half_area(nodes[0, 0:3].min(axis=1), nodes[0, 3:6].max(axis=1)))
 
 
 @dataclass
@@ -189,6 +284,7 @@ def _flatten(tree: _BinaryTree, order: np.ndarray) -> Hierarchy:
         made += int(goes_on.sum())
         frontier = children[goes_on]
 
+    starts = np.cumsum([0, *(len(c) for c, _ in levels)])
     children = np.concatenate([c for c, _ in levels])
     numbers = np.concatenate([n for _, n in levels])
     used = children >= 0
@@ -200,6 +296,6 @@ def _flatten(tree: _BinaryTree, order: np.ndarray) -> Hierarchy:
     leaves = children[used & (numbers < 0)]
     leaf_end = np.zeros(count, bool)
     leaf_end[first[leaves] + size[leaves] - 1] = True
-    inner_cost = area[children[numbers >= 0]].sum() + area[-1]
-    cost = (inner_cost + (area[leaves] * size[leaves]).sum()) / max(area[-1], 1e-300)
-    return Hierarchy(nodes, leaf_order, leaf_end, stack_size, float(cost))
+    extent = _extent(nodes)
+    cost = 1.0 + _weighted_surface(nodes, leaf_end) / max(extent, 1e-300)
+    return Hierarchy(nodes, leaf_order, leaf_end, stack_size, tuple(starts.tolist()), cost, extent)

@@ -159,6 +159,90 @@ def test_a_million_triangles_build_in_three_seconds():
     assert seconds < 3
 
 
+# Refitting
+# ---------------------------------------------------------------------------------------------------------------------
+
+
+def moved_apart(triangles, seed=4):
+    """The same triangles elsewhere, each on its own way."""
+    generator = np.random.default_rng(seed)
+    return (triangles + generator.normal(0, 0.2, (len(triangles), 1, 3))).astype(np.float32)
+
+
+def assert_boxes_fit(hierarchy, triangles):
+    boxes = hierarchy.nodes[:, :6].reshape(-1, 2, 3, bvh.WIDTH)
+    for node, slot, first, stop in leaves(hierarchy):
+        corners = triangles[hierarchy.order[first:stop]].reshape(-1, 3)
+        np.testing.assert_array_equal(boxes[node, :, :, slot], [corners.min(axis=0), corners.max(axis=0)])
+    for node, slot in np.argwhere((hierarchy.nodes[:, 6] >= 0) & (boxes[:, 0, 0] <= boxes[:, 1, 0])):
+        inner = boxes[int(hierarchy.nodes[node, 6, slot])]
+        np.testing.assert_array_equal(boxes[node, :, :, slot], [inner[0].min(axis=1), inner[1].max(axis=1)])
+
+
+def test_refitted_boxes_fit_exactly(triangles):
+    built = bvh.build(triangles)
+    there = moved_apart(triangles)
+    refitted, fresh = bvh.refit(built, there)
+    assert_boxes_fit(refitted, there)
+    np.testing.assert_array_equal(fresh, np.arange(len(built.nodes)))
+    np.testing.assert_array_equal(built.nodes, bvh.build(triangles).nodes)  # the old one was left alone
+    back, _ = bvh.refit(refitted, triangles)
+    np.testing.assert_array_equal(back.nodes, built.nodes)
+    np.testing.assert_allclose([back.cost, back.extent], [built.cost, built.extent], rtol=1e-9)
+
+
+def test_refitting_a_part_is_refitting_all(triangles):
+    built = bvh.build(triangles)
+    changed = np.random.default_rng(2).random(len(triangles)) < 0.05
+    changed[0] = True
+    there = np.where(changed[:, None, None], moved_apart(triangles), triangles)
+    part, fresh = bvh.refit(built, there, changed)
+    whole, _ = bvh.refit(built, there)
+    np.testing.assert_array_equal(part.nodes, whole.nodes)
+    np.testing.assert_allclose([part.cost, part.extent], [whole.cost, whole.extent], rtol=1e-6)
+    untouched = np.setdiff1d(np.arange(len(built.nodes)), fresh)
+    np.testing.assert_array_equal(part.nodes[untouched], built.nodes[untouched])
+    assert len(fresh) < len(built.nodes) or len(triangles) < 1000
+
+
+def test_refitted_trees_give_the_same_answers(triangles):
+    there = moved_apart(triangles)
+    origins, directions = random_rays(1000)
+    origins = origins + there.reshape(-1, 3).mean(axis=0)
+    refitted, _ = bvh.refit(bvh.build(triangles), there)
+    found, cost = rays.traverse(refitted, there, origins, directions)
+    assert (found.distance == rays.closest_hit(there.astype(float), origins, directions).distance).all()
+    assert cost.stack.max() <= refitted.stack_size
+
+
+def test_cost_counts_what_a_random_ray_meets():
+    """A leaf of two triangles and one of one at the ends of a unit cube: half surfaces 3 of the root, 1 of each leaf."""
+    ends = np.array(
+        [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 1, 1], [1, 0, 1]], [[0, 0, 0], [1, 1, 0], [1, 0, 0]]]
+    )
+    built = bvh.build(ends.astype(np.float32))
+    assert built.extent == 3.0
+    np.testing.assert_allclose(built.cost, 1 + (2 * 1 + 1) / 3)  # the leaf of two, and the one
+
+
+@pytest.mark.parametrize(
+    "name,stretch",
+    [("still", False), ("shifted", False), ("grown", False), ("a part a little", False), ("shuffled", True)],
+)
+def test_when_building_again_is_better(name, stretch):
+    triangles = random_triangles(2000, size=0.02)
+    part = np.arange(2000)[:, None, None] < 100
+    there = {
+        "still": triangles,
+        "shifted": triangles + np.float32(30),
+        "grown": triangles * np.float32(1.1),
+        "a part a little": np.where(part, triangles + np.float32(0.05), triangles),
+        "shuffled": triangles[np.random.default_rng(0).permutation(2000)],
+    }[name].astype(np.float32)
+    built = bvh.build(triangles)
+    assert bvh.stretched(bvh.refit(built, there)[0], built) == stretch
+
+
 # Rays
 # ---------------------------------------------------------------------------------------------------------------------
 
