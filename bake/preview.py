@@ -37,12 +37,12 @@ def write_previews(
         Cancelled: ``should_stop`` returned true.
     """
     camera = snapshot.camera or cameras.suggest(field, WIDTH / HEIGHT)
-    renderer = PreviewPass(snapshot, scene, field)
+    renderer = PreviewPass(snapshot, scene, field, field.grid.center)
     pictures = renderer.render(camera, WIDTH, HEIGHT, _SAMPLES, should_stop=should_stop)
     if pictures is None:
         raise Cancelled("cancelled; nothing was written")
     for path, radiance in zip((picture, probes), pictures):
-        save_png(path, standard_view(radiance, snapshot.exposure))
+        save_png(path, standard_view(radiance[..., :3], snapshot.exposure))
 
 
 def standard_view(radiance: np.ndarray, exposure: float) -> np.ndarray:

@@ -9,7 +9,7 @@ from pathlib import Path
 import gpu
 
 from ..core.errors import NoGpuError
-from . import create_infos
+from . import create_infos, viewport_create_infos
 
 _GLSL = Path(__file__).parent / "glsl"
 
@@ -19,7 +19,7 @@ _programs: dict[tuple, gpu.types.GPUShader] = {}
 
 
 def program(name: str, **defines) -> gpu.types.GPUShader:
-    """The compiled shader ``name`` (a function of ``create_infos``) with ``defines``.
+    """The compiled shader ``name`` (a function of ``create_infos`` or ``viewport_create_infos``) with ``defines``.
 
     A define of None or False is left out, True is defined empty.
 
@@ -40,7 +40,8 @@ def _compile(name: str, defines: dict) -> gpu.types.GPUShader:
     info.define("SHARED_", "shared")
     for key, value in defines.items():
         info.define(key, "" if value is True else str(value))
-    stages = getattr(create_infos, name)(info, defines)
+    bindings = viewport_create_infos if hasattr(viewport_create_infos, name) else create_infos
+    stages = getattr(bindings, name)(info, defines)
     for stage, files in stages.items():
         getattr(info, f"{stage}_source")("\n".join(_source(file) for file in files))
     try:

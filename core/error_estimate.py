@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a grid is too coarse for its light, told from the field alone.
+
+Interpolating linearly between nodes a distance h apart is off by at most h²/8 times the second derivative of what is
+interpolated. The second difference of three probes in a row is h² times that derivative, so an eighth of it, as a share of
+the light there, estimates what a cell gets wrong. It does not know about errors of the probes themselves.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .conventions import ACTIVE, COSINE_LOBE, band_of
+from .field import Field
+
+
+def interpolation_error(field: Field) -> np.ndarray:
+    """(P,) float32 relative error of irradiance in the cell whose first corner is the node; 0 where nothing is known.
+
+    Nodes at the far ends of an axis hold what the last cell before them does. Probes that are culled or invalid carry
+    their neighbours' light and tell nothing.
+    """
+    nx, ny, nz = field.grid.resolution
+    lobe = np.array([COSINE_LOBE[band_of(i)] for i in range(field.coefficients.shape[1])])
+    light = (field.coefficients * lobe[:, None]).reshape(nz, ny, nx, -1)
+    active = (field.state == ACTIVE).reshape(nz, ny, nx)
+    squared = np.zeros((nz, ny, nx))
+    for axis in range(3):
+        squared += _second_difference(light, active, axis) ** 2
+    strength = np.linalg.norm(light, axis=-1)
+    # In the dark a share of nearly nothing would be a large error that nobody sees.
+    floor = 0.05 * strength[active].mean() if active.any() else 0.0
+    share = np.sqrt(squared) / np.maximum(np.maximum(strength, floor), 1e-30) / 8.0
+    return _cell_means(share, active).reshape(-1).astype(np.float32)
+
+
+def _second_difference(light: np.ndarray, active: np.ndarray, axis: int) -> np.ndarray:
+    """Norm of the second difference along ``axis`` at every node; 0 where a neighbour is missing or not active. At the
+    ends of the axis the neighbour's holds."""
+    result = np.zeros(active.shape)
+    count = active.shape[axis]
+    if count < 3:
+        return result
+    before, middle, after = (_part(axis, slice(i, count - 2 + i)) for i in range(3))
+    known = active[before] & active[middle] & active[after]
+    norm = np.linalg.norm(light[before] - 2 * light[middle] + light[after], axis=-1)
+    result[middle] = np.where(known, norm, 0.0)
+    for end, neighbour in ((0, 1), (count - 1, count - 2)):
+        result[_part(axis, end)] = result[_part(axis, neighbour)]
+    return result
+
+
+def _cell_means(share: np.ndarray, active: np.ndarray) -> np.ndarray:
+    """Mean over the active corners of every cell, at its first corner."""
+    total, weight = np.where(active, share, 0.0), active.astype(float)
+    for axis in range(3):
+        count = share.shape[axis]
+        if count > 1:
+            low, high = _part(axis, slice(0, count - 1)), _part(axis, slice(1, count))
+            for values in (total, weight):
+                values[low] = values[low] + values[high]
+                values[_part(axis, count - 1)] = values[_part(axis, count - 2)]
+    return total / np.maximum(weight, 1.0)
+
+
+def _part(axis: int, selection) -> tuple:
+    return (*[slice(None)] * axis, selection)

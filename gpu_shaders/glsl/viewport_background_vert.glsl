@@ -1,0 +1,7 @@
+/* The world behind the scene, vertex stage: one triangle over the whole view, at its far end. */
+
+void main()
+{
+  place = corner;
+  gl_Position = vec4(corner, 1.0, 1.0);
+}

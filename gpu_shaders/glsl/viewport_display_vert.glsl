@@ -1,0 +1,7 @@
+/* The finished view, vertex stage: one triangle over the whole region. */
+
+void main()
+{
+  place = corner * 0.5 + 0.5;
+  gl_Position = vec4(corner, 0.0, 1.0);
+}

@@ -1,0 +1,94 @@
+/* What the preview shows of surfaces; needs viewport_data_lib. */
+
+/* Reflected light of all lamps: diffuse, and a Phong lobe scaled to keep its energy (Lafortune and Willems, 1994). */
+vec3 lamps_radiance(Surface surface, vec3 direction, vec3 origin, uvec3 key, int index)
+{
+  vec3 mirrored = reflect(direction, surface.normal);
+  float exponent = shade_info[1].z;
+  float highlight = shade_info[1].y * (exponent + 2.0) * 0.15915494309189535;
+  vec3 sum = vec3(0.0);
+  for (int light = 0; light < light_count; light++) {
+    vec2 u = sample_r2(key + uvec3(0u, 0u, uint(light) * 0x9E3779B9u), index);
+    vec3 irradiance = light_irradiance(light, surface.position, origin, surface.normal, u);
+    if (irradiance != vec3(0.0)) {
+      vec3 reflected = surface.albedo * 0.3183098861837907;
+      if (highlight > 0.0) {
+        float along = max(dot(mirrored, sample_light(light, surface.position, u).direction), 0.0);
+        reflected += highlight * pow(along, exponent);
+      }
+      sum += reflected * irradiance;
+    }
+  }
+  return sum;
+}
+
+#ifdef HAS_FIELD
+vec3 field_irradiance_at(vec3 point, vec3 normal)
+{
+  float weights[8];
+  int first_node = node_index(lookup_cell(point - shade_info[0].xyz, normal, weights));
+  return max(field_irradiance(first_node, vec4(weights[0], weights[1], weights[2], weights[3]),
+                              vec4(weights[4], weights[5], weights[6], weights[7]), normal),
+             vec3(0.0));
+}
+
+/* Validity blended as the grid lies in space, or the cell's error. */
+vec3 data_color(vec3 point)
+{
+  ivec3 resolution = ivec3(grid_info[3].xyz);
+  vec4 homogeneous = vec4(point - shade_info[0].xyz, 1.0);
+  vec3 lattice = vec3(dot(grid_info[0], homogeneous), dot(grid_info[1], homogeneous), dot(grid_info[2], homogeneous));
+  lattice = clamp(lattice, vec3(0.0), vec3(resolution - 1));
+  ivec3 cell = min(ivec3(lattice), max(resolution - 2, ivec3(0)));
+  if (shade_mode() == ERROR) {
+    return heat_color(element(node_marks, node_index(cell)).z / FULL_SCALE_ERROR);
+  }
+  vec3 blend = lattice - vec3(cell);
+  vec3 color = vec3(0.0);
+  for (int corner = 0; corner < 8; corner++) {
+    ivec3 step = ivec3(corner & 1, (corner >> 1) & 1, corner >> 2);
+    vec3 part = mix(1.0 - blend, blend, vec3(step));
+    float weight = part.x * part.y * part.z;
+    if (weight > 0.0) {
+      color += weight * state_color(node_index(cell + step));
+    }
+  }
+  return color;
+}
+#endif
+
+/* What is shown of a surface that a ray along `direction` met after `distance`. */
+vec3 shade_surface(Surface surface, vec3 direction, float distance, uvec3 key, int index)
+{
+  int mode = shade_mode();
+  if (mode == NORMALS) {
+    return display_to_linear(surface.normal * 0.5 + 0.5);
+  }
+#ifdef HAS_FIELD
+  if (mode >= VALIDITY) {
+    float facing = 0.6 + 0.4 * abs(dot(surface.normal, direction));
+    return display_to_linear(data_color(surface.position) * facing);
+  }
+  vec3 indirect = mode == DIRECT ? vec3(0.0) : shade_info[1].x * field_irradiance_at(surface.position, surface.normal);
+#else
+  if (mode >= VALIDITY) {
+    return vec3(0.1);
+  }
+  vec3 indirect = vec3(0.0);
+#endif
+  if (mode == IRRADIANCE) {
+    return indirect * 0.3183098861837907;
+  }
+  vec3 radiance = surface.albedo * 0.3183098861837907 * indirect;
+  if (mode != INDIRECT) {
+    vec3 origin = step_off(surface.position, surface.normal, -direction, distance);
+    radiance += surface.emission + lamps_radiance(surface, direction, origin, key, index);
+  }
+  return radiance;
+}
+
+/* One key a pixel, so that soft shadows look the same in every kind of picture. */
+uvec3 pixel_key(ivec2 pixel)
+{
+  return uvec3(uint(pixel.x), uint(pixel.y), 0x51ED270Bu);
+}

@@ -1,0 +1,55 @@
+/* The scene's triangles in a view, fragment stage: once for depth alone, then the nearest surface is shaded and added to the sum.
+ *
+ * With several volumes the second pass runs once for each and shades what belongs to that one.
+ * volume_boxes, 4 elements a volume: rows from the scene's frame to the box −1..1; half sizes, metres
+ */
+
+#ifdef VOLUMES
+/* The volume that lights `point`: the first (smallest) that holds it, else the nearest. */
+int owning_volume(vec3 point)
+{
+  int nearest = 0;
+  float least = 3.0e38;
+  for (int i = 0; i < VOLUMES; i++) {
+    vec4 homogeneous = vec4(point, 1.0);
+    vec3 place = vec3(dot(volume_boxes[4 * i], homogeneous), dot(volume_boxes[4 * i + 1], homogeneous),
+                      dot(volume_boxes[4 * i + 2], homogeneous));
+    vec3 outside = max(abs(place) - 1.0, vec3(0.0)) * volume_boxes[4 * i + 3].xyz;
+    float squared = dot(outside, outside);
+    if (squared < least) {
+      least = squared;
+      nearest = i;
+    }
+  }
+  return nearest;
+}
+#endif
+
+void main()
+{
+  int index = int(surface_triangle + 0.5);
+#ifdef HAS_ALPHA
+  if (element(triangle_corners, 3 * index + 1).w != 0.0 && is_hole(index, surface_barycentric)) {
+    discard;
+  }
+#endif
+  radiance_sum = vec4(0.0);
+  if (depth_only == 0) {
+#ifdef VOLUMES
+    if (owning_volume(surface_point) != volume) {
+      discard;
+    }
+#endif
+    vec3 eye = view_info[0].xyz, forward = view_info[3].xyz;
+    vec3 direction = forward;
+    if (view_info[0].w == 0.0) {
+      direction = normalize(surface_point - eye);
+    }
+    else {
+      eye = surface_point - forward * dot(surface_point - eye, forward);
+    }
+    Surface surface = resolve_surface(index, surface_barycentric, eye, direction, view_info[3].w);
+    float distance = length(surface.position - eye);
+    radiance_sum = vec4(shade_surface(surface, direction, distance, pixel_key(ivec2(gl_FragCoord.xy)), sample_index), 1.0);
+  }
+}

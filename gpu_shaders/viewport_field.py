@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A finished field as textures, for pictures and the viewport."""
+
+from __future__ import annotations
+
+import gpu
+import numpy as np
+
+from ..core import lookup
+from ..core.conventions import ACTIVE, CULLED, DEPTH_EDGE
+from ..core.error_estimate import interpolation_error
+from ..core.field import Field
+from .textures import upload
+
+
+class FieldTextures:
+    """What shaders read of one field. Its frame is the grid's centre; ``offset`` leads there from the scene's origin."""
+
+    def __init__(self, field: Field, origin: np.ndarray):
+        """``origin`` (3,): what the scene's textures are relative to, world metres."""
+        grid = field.grid
+        self.field = field
+        self.offset = grid.center - origin
+        self.bands = field.bands
+        rows = np.zeros((*field.coefficients.shape[:2], 4), np.float32)
+        rows[..., :3] = field.coefficients
+        self.positions = grid.positions() + field.offset - grid.center
+        active = np.flatnonzero(field.state == ACTIVE)
+        nodes = np.full((grid.count, 4), -2.0, np.float32)
+        nodes[:, :3] = self.positions
+        nodes[field.state == CULLED, 3] = -1.0
+        nodes[active, 3] = np.arange(len(active))
+        moments = np.zeros((len(active) * DEPTH_EDGE**2, 4), np.float32)
+        moments[:, :2] = field.depth[active].reshape(-1, 2)
+        marks = np.zeros((grid.count, 4), np.float32)
+        marks[:, 0], marks[:, 1], marks[:, 2] = field.validity, field.state, interpolation_error(field)
+        self._textures = {
+            "field_in": upload(rows, "field coefficients"),
+            "grid_nodes": upload(nodes, "grid nodes"),
+            "depth_moments": upload(moments, "depth statistics"),
+            "node_marks": upload(marks, "grid nodes"),
+        }
+        self._grid_info = gpu.types.GPUUniformBuf(gpu.types.Buffer("FLOAT", 20, lookup.grid_info(grid).reshape(-1)))
+
+    @property
+    def defines(self) -> dict:
+        """What shaders that read a field are compiled with; without one, ``NO_FIELD``."""
+        return {"HAS_FIELD": True, "BANDS": self.bands, "COEFFICIENTS": self.bands**2}
+
+    def show(self, coefficients: gpu.types.GPUTexture) -> None:
+        """Reads the light from ``coefficients`` from now on: P·bands² elements that something else keeps up to date."""
+        self._textures["field_in"] = coefficients
+
+    def bind(self, shader) -> None:
+        for name, texture in self._textures.items():
+            shader.uniform_sampler(name, texture)
+        shader.uniform_block("grid_info", self._grid_info)
+
+    def spheres(self, eye: np.ndarray, radius: float, most: int) -> np.ndarray:
+        """(S, 4) float32: centres of the ``most`` probes nearest to ``eye`` (3,) in the scene's frame, node index, or −1
+        where culled, −2 where invalid. Probes right before the eye are left out: they would hide the picture."""
+        field = self.field
+        marks = np.where(field.state == ACTIVE, np.arange(len(field.state)), np.where(field.state == CULLED, -1, -2))
+        centres = np.concatenate([self.positions + self.offset, marks[:, None]], axis=1)
+        distance = np.linalg.norm(centres[:, :3] - eye, axis=1)
+        distance[distance < 6 * radius] = np.inf
+        nearest = np.argsort(distance, kind="stable")[: min(most, int(np.isfinite(distance).sum()))]
+        return centres[nearest].astype(np.float32)
+
+
+NO_FIELD = {"HAS_FIELD": False, "BANDS": 1, "COEFFICIENTS": 1}
