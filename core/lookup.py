@@ -53,7 +53,16 @@ def grid_info(grid: Grid) -> np.ndarray:
 def lookup_weights(field: Field, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Nodes (N, 8) and weights (N, 8), summing to 1, that make up the field at ``points`` (N, 3) with ``normals`` (N,
     3)."""
-    grid = field.grid
+    nodes, weights = trilinear(field.grid, points)
+    seen_points = points + normals * visibility_bias(field.grid)
+    state = field.state[nodes]
+    seen = np.where(state == ACTIVE, np.maximum(visibility(field, nodes, seen_points), LEAST_WEIGHT), 1.0)
+    weights = weights * np.where(state == INVALID, INVALID_WEIGHT, seen)
+    return nodes, weights / weights.sum(axis=1, keepdims=True)
+
+
+def trilinear(grid: Grid, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes (N, 8) around ``points`` (N, 3), clamped to the box, and their plain weights (N, 8), which sum to 1."""
     resolution = np.array(grid.resolution)
     to_lattice = grid.world_to_lattice()
     lattice = np.clip(points @ to_lattice[:, :3].T + to_lattice[:, 3], 0, resolution - 1)
@@ -62,12 +71,7 @@ def lookup_weights(field: Field, points: np.ndarray, normals: np.ndarray) -> tup
     corners = np.array([[c & 1, c >> 1 & 1, c >> 2] for c in range(8)])
     weights = np.where(corners[None], blend[:, None], 1 - blend[:, None]).prod(axis=2)
     node = np.minimum(cell[:, None] + corners, resolution - 1)
-    nodes = node[..., 0] + resolution[0] * (node[..., 1] + resolution[1] * node[..., 2])
-    seen_points = points + normals * visibility_bias(grid)
-    state = field.state[nodes]
-    seen = np.where(state == ACTIVE, np.maximum(visibility(field, nodes, seen_points), LEAST_WEIGHT), 1.0)
-    weights = weights * np.where(state == INVALID, INVALID_WEIGHT, seen)
-    return nodes, weights / weights.sum(axis=1, keepdims=True)
+    return node[..., 0] + resolution[0] * (node[..., 1] + resolution[1] * node[..., 2]), weights
 
 
 def visibility(field: Field, nodes: np.ndarray, points: np.ndarray) -> np.ndarray:
