@@ -118,10 +118,14 @@ def step_off(points: np.ndarray, normals: np.ndarray, towards: np.ndarray, dista
 
 
 def traverse(
-    hierarchy: Hierarchy, triangles: np.ndarray, origins: np.ndarray, directions: np.ndarray
+    hierarchy: Hierarchy,
+    triangles: np.ndarray,
+    origins: np.ndarray,
+    directions: np.ndarray,
+    limits: np.ndarray | float = np.inf,
 ) -> tuple[Hits, TraversalCost]:
-    """Nearest hits through ``hierarchy``, built of ``triangles`` (T, 3, 3), with children entered nearest first; and
-    the work done.
+    """Nearest hits closer than ``limits`` through ``hierarchy``, built of ``triangles`` (T, 3, 3), with children
+    entered nearest first; and the work done. Where nothing is hit the distance is the limit.
 
     Every ray takes one step (a node or a leaf) per round, on a stack of ``hierarchy.stack_size`` entries as in the
     shader. ``Hits.triangle`` counts as in ``triangles``, not in leaf order.
@@ -130,7 +134,7 @@ def traverse(
     corners = np.asarray(triangles, float)[hierarchy.order]
     boxes = hierarchy.nodes[:, : NODE_TEXELS - 1].reshape(-1, 2, 3, WIDTH).astype(float)
     children = hierarchy.nodes[:, NODE_TEXELS - 1].astype(np.int64)
-    hits = Hits(np.full(count, np.inf), np.full(count, -1), np.zeros((count, 2)))
+    hits = Hits(np.broadcast_to(limits, count).astype(float), np.full(count, -1), np.zeros((count, 2)))
     cost = TraversalCost(*(np.zeros(count, np.int64) for _ in range(3)))
     stack = np.zeros((count, hierarchy.stack_size), np.int64)
     stack_entry = np.zeros((count, hierarchy.stack_size))
