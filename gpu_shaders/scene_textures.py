@@ -10,11 +10,13 @@ from __future__ import annotations
 import numpy as np
 
 from ..core import bvh
+from ..core.errors import InputError
 from ..core.snapshot import Image, Light, SceneSnapshot
 from .textures import ROW, upload
 
 _EXTENSIONS = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2, "MIRROR": 3}
 _POINT, _SPOT, _SUN, _RECTANGLE, _ELLIPSE = range(5)
+_MOST_TRIANGLES = 1 << 24  # their numbers are kept as float32, which knows every whole number up to here
 
 
 class SceneTextures:
@@ -25,7 +27,16 @@ class SceneTextures:
     """
 
     def __init__(self, snapshot: SceneSnapshot, origin: np.ndarray, emitter_density: np.ndarray):
-        """``origin`` (3,) world metres; ``emitter_density`` (T,) per m², from core/emitters.py."""
+        """``origin`` (3,) world metres; ``emitter_density`` (T,) per m², from core/emitters.py.
+
+        Raises:
+            InputError: more triangles than the GPU can number.
+        """
+        if len(snapshot.triangles) > _MOST_TRIANGLES:
+            raise InputError(
+                f"scene '{snapshot.name}' has {len(snapshot.triangles)} triangles, {_MOST_TRIANGLES} is the most; hide "
+                "objects from rendering or lower their subdivision"
+            )
         corners = (snapshot.triangle_positions - origin).astype(np.float32)
         self.hierarchy = bvh.build(corners)
         order = self.hierarchy.order
