@@ -26,6 +26,11 @@ SIGNED_OPTIONS = (
     "--points",
     "--spp",
     "--height",
+    "--axes",
+    "--scale",
+    "--gain",
+    "--probe",
+    "--size",
 )
 
 
@@ -50,7 +55,7 @@ def join_signed_values(argv: list[str]) -> list[str]:
             value = next(words, None)
             if value is None:
                 joined.append(word)
-            elif value.startswith("-") and _is_number(value):
+            elif value.startswith("-") and (_is_number(value) or word == "--axes"):
                 joined.append(f"{word}={value}")
             else:
                 joined += [word, value]

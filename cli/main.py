@@ -3,7 +3,7 @@
 
 A command is a module of this folder with
 
-* ``HELP``: one line; ``NEEDS_BLENDER``, ``NEEDS_GPU``: what it runs on;
+* ``HELP``: one line; ``NEEDS_BLENDER``, ``NEEDS_GPU``: what it runs on; the first may be a function of the arguments;
 * ``add_arguments(parser, in_blender)``;
 * ``run(args, reporter, should_stop) -> (summary, exit status)``: does the work; the summary is printed as JSON, below
   what ``reporter.result`` was given. What a command prints itself is lost: Blender's operators print to that stream;
@@ -90,7 +90,8 @@ def _run(argv: list[str], in_blender: bool, child: bool) -> int:
     module = modules[args.command]
     if not child and hasattr(module, "check"):
         module.check(args)
-    if module.NEEDS_BLENDER and not (in_blender or child):
+    needs_blender = module.NEEDS_BLENDER(args) if callable(module.NEEDS_BLENDER) else module.NEEDS_BLENDER
+    if needs_blender and not (in_blender or child):
         return _run_in_child(argv, args, module)
     stop = Stop()
     if child:
