@@ -4,55 +4,23 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ..core import lookup, measures
-from ..core import spherical_harmonics as sh
+from ..core import measures
 from ..core.conventions import ACTIVE
-from ..core.errors import Cancelled, InputError
+from ..core.errors import InputError
 from ..core.field import Field
-from ..core.panorama import panorama_irradiance, project_panorama
-from ..formats import probe_file
+from ..core.ringing import ringing
+from ..formats import probe_file, report_errors
+from ..formats.report import write_page
+from ..formats.staging import StagedFolder
+from . import verify_points
+from .verify_measure import Points, Reference, Row, measure
 
 HELP = "compares a probe file with Cycles panoramas of its scene"
 NEEDS_BLENDER, NEEDS_GPU = True, False
-
-_SECOND_SEED = 1_000_003  # panoramas take consecutive seeds from their first: the two series never meet
-
-
-@dataclass(frozen=True)
-class Points:
-    """Points of one kind; every point is asked for K irradiances.
-
-    ``normals`` is (N, K, 3): six axes in free space, its own normal for a point on a surface.
-    """
-
-    name: str
-    positions: np.ndarray  # (N, 3) world metres
-    normals: np.ndarray
-
-
-@dataclass(frozen=True)
-class Row:
-    """One line of the table."""
-
-    points: Points
-    error: measures.ErrorFigures  # of the probe file's lookup
-    floor: measures.ErrorFigures  # of a perfect probe with the file's bands, standing at the point itself
-    noise: float  # of the reference
-
-    def as_dict(self) -> dict:
-        """Plain values for JSON."""
-        worst = self.points.positions[self.error.worst_index]
-        return {
-            **self.error.as_dict(),
-            "worst_position": [round(float(value), 6) for value in worst],
-            "noise": self.noise,
-            "floor": self.floor.as_dict(),
-        }
 
 
 def add_arguments(parser, in_blender: bool) -> None:
@@ -75,6 +43,17 @@ def add_arguments(parser, in_blender: bool) -> None:
     parser.add_argument("--height", metavar="N", type=int, default=64, help="rows of a panorama (default %(default)s)")
     parser.add_argument(
         "--seed", metavar="N", type=int, default=0, help="of the choice of points (default %(default)s)"
+    )
+    parser.add_argument(
+        "--trilinear",
+        action="store_true",
+        help="also the error of perfect probes at the nodes with plain trilinear lookup; renders those nodes too",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="DIR",
+        help="folder for the report with maps of the error (default: that of PROBES.exr)",
     )
     parser.add_argument("--quiet", action="store_true", help="no progress; warnings stay")
 
@@ -102,27 +81,40 @@ def run(args, reporter, should_stop):
     check(args)
     started = time.perf_counter()
     field = probe_file.read(args.probes)
-    reporter.phase("read")
-    scene = open_blend(args.file)
-    frame = field.metadata.get("scene", {}).get("frame")
-    snapshot = read_scene(scene, frame=frame)
-    for warning in snapshot.warnings:
-        reporter.warn(warning)
-    if not len(snapshot.triangles):
-        raise InputError(
-            f"{args.file}: scene '{snapshot.name}' has no surface that renders; name the file that was baked"
-        )
-    if field.metadata.get("scene_hash") not in (None, scene_hash(snapshot)):
-        reporter.warn(
-            f"the scene in {args.file} is not the one that was baked into {args.probes}: it has changed since, or "
-            "another Blender reads it differently"
-        )
-    kinds = choose_points(field, snapshot, args.points, args.seed)
-    rows = measure(scene, field, kinds, args.spp, args.height, frame, reporter, should_stop)
-    reporter.result(table(rows, field, args.spp, args.height))
+    name = f"{Path(args.probes).stem}_verify.html"
+    with StagedFolder(args.output or Path(args.probes).parent) as folder:
+        reporter.phase("read")
+        scene = open_blend(args.file)
+        frame = field.metadata.get("scene", {}).get("frame")
+        snapshot = read_scene(scene, frame=frame)
+        for warning in snapshot.warnings:
+            reporter.warn(warning)
+        if not len(snapshot.triangles):
+            raise InputError(
+                f"{args.file}: scene '{snapshot.name}' has no surface that renders; name the file that was baked"
+            )
+        if field.metadata.get("scene_hash") not in (None, scene_hash(snapshot)):
+            reporter.warn(
+                f"the scene in {args.file} is not the one that was baked into {args.probes}: it has changed since, or "
+                "another Blender reads it differently"
+            )
+        reporter.phase("points")
+        space = verify_points.FreeSpace(snapshot, verify_points.cycles_light(scene, frame))
+        kinds = choose_points(field, space, args.points, args.seed)
+        reference = Reference(scene, args.spp, args.height, frame, reporter, should_stop)
+        rows = measure(field, kinds, reference, reporter, args.trilinear)
+        engine = f"Cycles {2 * args.height}×{args.height}, 2 × {args.spp} samples"
+        reporter.result(table(rows, field, engine))
+        facts = [f"against {engine}", f"seed {args.seed}"]
+        title = f"{Path(args.probes).name} against {Path(args.file).name}"
+        outlines = report_errors.outlines(snapshot)
+        found = [_for_report(row) for row in rows]
+        text = report_errors.errors_html(title, facts, found, field.grid, outlines, field.bands, reporter.warnings)
+        write_page(folder.path(name), text)
     summary = {
         "points": {row.points.name: row.as_dict() for row in rows},
         "bands": field.bands,
+        "ringing": ringing(field.coefficients[field.state == ACTIVE]).as_dict(),
         "reference": {
             "engine": "Cycles",
             "width": 2 * args.height,
@@ -132,29 +124,27 @@ def run(args, reporter, should_stop):
         },
         "seed": args.seed,
         "seconds": {"total": round(time.perf_counter() - started, 6)},
+        "files": [str(folder.folder / name)],
         "warnings": reporter.warnings,
     }
     return summary, 0
 
 
-def choose_points(field: Field, snapshot, count: int, seed: int) -> list[Points]:
+def choose_points(field: Field, space: verify_points.FreeSpace, count: int, seed: int) -> list[Points]:
     """Active probes, random free points and random surface points in the volume of ``field``, up to ``count`` of each.
 
     Raises:
         InputError: no active probe stands in free space.
     """
-    from . import verify_points
-
     random = np.random.default_rng(seed)
-    space = verify_points.FreeSpace(snapshot)
     nodes = (field.grid.positions() + field.offset)[field.state == ACTIVE]
-    nodes = nodes[space.is_free(nodes)]
+    nodes = nodes[random.permutation(len(nodes))[: max(4 * count, 64)]]
+    nodes = nodes[space.is_free(nodes)][:count]
     if not len(nodes):
         raise InputError(
             f"{field.grid.name}: none of its active probes stands in free space of this scene; "
             "name the scene that was baked"
         )
-    nodes = nodes[np.sort(random.permutation(len(nodes))[:count])]
     free = verify_points.free_points(space, field.grid, count, seed)
     surface, normals = verify_points.surface_points(space, field.grid, count, seed)
     six = verify_points.SIX_NORMALS
@@ -167,67 +157,30 @@ def choose_points(field: Field, snapshot, count: int, seed: int) -> list[Points]
     return kinds
 
 
-def measure(
-    scene, field: Field, kinds: list[Points], samples: int, height: int, frame: int | None, reporter, should_stop
-) -> list[Row]:
-    """Renders all points with two seeds and compares. See ``Row`` for what comes out.
-
-    Raises:
-        Cancelled: ``should_stop`` returned true between two panoramas.
-        InputError: a kind of points is black in the reference.
-    """
-    from ..scene.cycles_reference import render_panoramas
-
-    def progress(_done, _total):
-        reporter.advance(1)
-        if should_stop():
-            raise Cancelled()
-
-    positions = np.concatenate([kind.positions for kind in kinds])
-    reporter.phase("Cycles", 2 * len(positions))
-    images = [
-        render_panoramas(scene, positions, 2 * height, height, samples, seed, frame=frame, progress=progress)
-        for seed in (1, _SECOND_SEED)
-    ]
-    reporter.phase("compare")
-    rows = []
-    first = 0
-    for kind in kinds:
-        part = slice(first, first + len(kind.positions))
-        first = part.stop
-        rows.append(_compare(field, kind, images[0][part], images[1][part]))
-    return rows
-
-
-def _compare(field: Field, kind: Points, first: np.ndarray, second: np.ndarray) -> Row:
-    """``first`` and ``second`` are (N, H, W, 3) panoramas of the same points with different seeds."""
-    series = [
-        np.stack([panorama_irradiance(image, normals) for image, normals in zip(images, kind.normals)])
-        for images in (first, second)
-    ]
-    reference = np.mean(series, axis=0)
-    if not reference.any():
-        raise InputError(
-            f"{kind.name}: Cycles sees no light at any of them; give the scene light before it is verified"
-        )
-    count = kind.normals.shape[1]
-    ours = lookup.irradiance(field, np.repeat(kind.positions, count, axis=0), kind.normals.reshape(-1, 3))
-    perfect = np.stack([project_panorama((a + b) / 2, field.bands) for a, b in zip(first, second)])
-    floor = sh.irradiance(perfect[:, None], kind.normals)
-    return Row(
-        kind,
-        measures.compare(ours.reshape(reference.shape), reference),
-        measures.compare(floor, reference),
-        measures.noise_of_mean(*series),
+def _for_report(row: Row) -> report_errors.KindOfPoints:
+    errors, biases = measures.point_errors(row.measured, row.reference, row.error.scale)
+    return report_errors.KindOfPoints(
+        row.points.name,
+        row.points.positions,
+        errors,
+        biases,
+        row.error,
+        row.floor,
+        row.trilinear,
+        row.noise,
+        row.negative,
+        row.negative_floor,
     )
 
 
-def table(rows: list[Row], field: Field, samples: int, height: int) -> str:
+def table(rows: list[Row], field: Field, engine: str) -> str:
     """The rows as text, errors in percent of the reference's RMS."""
+    heads = f"{'':16}{'points':>7}{'rel. RMS':>10}{'bias':>8}{'95th':>8}{'worst':>8}  {'worst at':24}{'noise':>7}"
+    heads += f"{f'floor of {field.bands} bands':>18}"
+    with_trilinear = rows[0].trilinear is not None
     lines = [
-        f"Error of irradiance in % of the reference's RMS; Cycles {2 * height}×{height}, 2 × {samples} samples",
-        f"{'':16}{'points':>7}{'rel. RMS':>10}{'bias':>8}{'95th':>8}{'worst':>8}  {'worst at':24}{'noise':>7}"
-        f"{f'floor of {field.bands} bands':>18}",
+        f"Error of irradiance in % of the reference's RMS; {engine}",
+        heads + (f"{'plain trilinear':>17}" if with_trilinear else ""),
     ]
     for row in rows:
         error = row.error
@@ -236,7 +189,15 @@ def table(rows: list[Row], field: Field, samples: int, height: int) -> str:
             f"{row.points.name:16}{error.points:7}{_percent(error.relative_rms):>10}{_percent(error.bias, True):>8}"
             f"{_percent(error.percentile_95):>8}{_percent(error.worst):>8}  {at:24}{_percent(row.noise):>7}"
             f"{_percent(row.floor.relative_rms):>18}"
+            + (f"{_percent(row.trilinear.relative_rms):>17}" if row.trilinear else "")
         )
+    for row in rows:
+        if row.negative.count:
+            lines.append(
+                f"{row.points.name}: {row.negative.count} of {row.negative.values} values are below zero, lowest "
+                f"{_percent(row.negative.lowest)}; perfect probes would have {row.negative_floor.count}, lowest "
+                f"{_percent(row.negative_floor.lowest)}"
+            )
     return "\n".join(lines)
 
 

@@ -1,34 +1,60 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where ``verify`` asks for the light: nodes, random free points and random surface points, none inside a solid."""
+"""Where ``verify`` asks for the light: nodes, random free points and random surface points, none in or behind a wall.
+
+That is decided as in the bake (``core.orientation``, ``core.relocation``), only that other eyes look: rays of Blender's
+own tree, and Cycles says what is lit.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
 from ..core.errors import InputError
 from ..core.grid import Grid
-from ..core.orientation import flipped_objects
+from ..core.orientation import ShellVote
+from ..core.panorama import panorama_coordinates
+from ..core.relocation import misplaced
 from ..core.snapshot import SceneSnapshot
 
 SIX_NORMALS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
 
+Light = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""(world points (N, 3), directions (S, 3)) -> (N, S) bool: light comes from there."""
+
 _RAYS = 128  # that decide whether a point is inside a solid
-_FREE_SHARE = 0.25  # of back faces in sight that a free point may have
+_DOUBTFUL = 0.25  # of back faces or of sky in sight: up to here a point is in a room, whatever the light
 _CLEARANCE = 0.02  # of a cell's shortest edge between a free point and the nearest surface
 _LIFT = 2e-3  # of a cell's shortest edge between a surface point and its surface
 _REACH = 0.5  # cells beyond the box in which surfaces that face it count: a volume seldom touches the walls it lights
 _TRIES = 200  # candidates per point that is asked for
+_LIGHT_HEIGHT, _LIGHT_SAMPLES = 16, 4  # of the panoramas that tell light from dark
+
+
+def cycles_light(scene, frame: int | None = None) -> Light:
+    """What Cycles sees lit in ``scene``: small panoramas, whose only message is black or not."""
+    from ..scene.cycles_reference import render_panoramas
+
+    def light(points, directions):
+        width = 2 * _LIGHT_HEIGHT
+        u, v = np.moveaxis(panorama_coordinates(directions), -1, 0)
+        column = np.minimum((u * width).astype(int), width - 1)
+        row = np.minimum((v * _LIGHT_HEIGHT).astype(int), _LIGHT_HEIGHT - 1)
+        images = render_panoramas(scene, points, width, _LIGHT_HEIGHT, _LIGHT_SAMPLES, frame=frame)
+        return images.any(axis=-1)[:, row, column]
+
+    return light
 
 
 class FreeSpace:
-    """Tells free space from the inside of solids, by rays against the scene's triangles: back faces all around mean
-    inside.
+    """Tells free space from the inside of solids and from the void behind walls.
 
-    Objects that free space sees from behind, such as a room made of a cube, count as inside out; the points that are
-    asked for vote on it together, as in ``core.orientation``.
+    Objects whose back faces are lit, such as a room made of a cube, are no solids; the first points that are asked for
+    vote on it. Without ``light`` all back faces are the inside of something, and there is no void.
     """
 
-    def __init__(self, snapshot: SceneSnapshot):
+    def __init__(self, snapshot: SceneSnapshot, light: Light | None = None):
         from mathutils.bvhtree import BVHTree
 
         self.snapshot = snapshot
@@ -38,16 +64,22 @@ class FreeSpace:
         self._tree = BVHTree.FromPolygons(
             (snapshot.vertices - self._origin).tolist(), snapshot.triangles.tolist(), all_triangles=True
         )
-        self._flipped: np.ndarray | None = None
+        self._light = light
+        self._shells: np.ndarray | None = None
 
     def is_free(self, points: np.ndarray, clearance_m: float = 0.0) -> np.ndarray:
-        """(N,) bool for world ``points`` (N, 3). The first call decides which objects are inside out."""
+        """(N,) bool for world ``points`` (N, 3). The first call decides which objects are shells."""
         seen = self._sightings(points)
-        if self._flipped is None:
-            self._flipped = flipped_objects(seen, max(len(self.snapshot.object_names), 1))
-        item = np.abs(seen) - 1
-        behind = (seen != 0) & ((seen < 0) != self._flipped[item])
-        free = behind.mean(axis=1) <= _FREE_SHARE
+        behind, background = seen < 0, seen == 0
+        lit = self._lit(points, np.maximum(behind.mean(axis=1), background.mean(axis=1)) > _DOUBTFUL)
+        if self._shells is None:
+            self._shells = np.zeros(max(len(self.snapshot.object_names), 1), bool)
+            if self._light is not None:
+                vote = ShellVote(len(self._shells))
+                vote.add(seen + 0.5 * lit * np.sign(seen))
+                self._shells = vote.shells()
+        solid = behind & ~self._shells[np.abs(seen) - 1]
+        free = ~misplaced(np.stack([kind.mean(axis=1) for kind in (solid, background, lit, behind)], axis=1))
         if clearance_m > 0:
             near = [
                 self._tree.find_nearest(point, clearance_m)[0] is not None for point in (points - self._origin).tolist()
@@ -76,6 +108,13 @@ class FreeSpace:
                     front = sum(a * b for a, b in zip(normal, direction)) < 0
                     seen[row, column] = (1 if front else -1) * (int(objects[triangle]) + 1)
         return seen
+
+    def _lit(self, points: np.ndarray, doubtful: np.ndarray) -> np.ndarray:
+        """(N, _RAYS) bool: what each ray meets sends light. Only ``doubtful`` (N,) points are asked about it."""
+        lit = np.ones((len(points), _RAYS), bool)
+        if self._light is not None and doubtful.any():
+            lit[doubtful] = self._light(points[doubtful], _spiral(_RAYS))
+        return lit
 
 
 def free_points(space: FreeSpace, grid: Grid, count: int, seed: int) -> np.ndarray:
@@ -123,7 +162,9 @@ def surface_points(space: FreeSpace, grid: Grid, count: int, seed: int) -> tuple
         at, normal, local = (at + lift * normal)[near], normal[near], local[near]
         if len(at):
             in_box = np.clip(local, -1, 1) @ grid.matrix[:3, :3].T + grid.matrix[:3, 3]
-            free = space.is_free(at) & ((np.abs(local) <= 1).all(axis=1) | space.see_each_other(at, in_box))
+            reached = (np.abs(local) <= 1).all(axis=1) | space.see_each_other(at, in_box)
+            at, normal = at[reached], normal[reached]
+            free = space.is_free(at) if len(at) else np.zeros(0, bool)
             points, normals = np.concatenate([points, at[free]]), np.concatenate([normals, normal[free]])
         if len(points) >= count:
             break

@@ -17,6 +17,9 @@ of its own,
     noise             = √ mean (a − b)² / (2 R)
 
 which is part of the relative RMS (their squares add). An error near the noise says nothing more.
+
+Irradiance below zero is counted over all values: how many of the N·K, and the most negative one over R. A truncated
+series rings, so the basis alone has its share (core/ringing.py takes it away).
 """
 
 from __future__ import annotations
@@ -60,12 +63,11 @@ def compare(measured: np.ndarray, reference: np.ndarray, scale: float | None = N
         scale = root_mean_square(reference)
     if not scale > 0:
         raise ValueError("the reference is zero everywhere: there is nothing to relate an error to")
-    difference = (measured - reference).reshape(len(reference), -1) / scale
-    errors = np.sqrt((difference**2).mean(axis=1))
+    errors, biases = point_errors(measured, reference, scale)
     worst = int(np.argmax(errors))
     return ErrorFigures(
-        relative_rms=root_mean_square(difference),
-        bias=float(difference.mean()),
+        relative_rms=root_mean_square(errors),
+        bias=float(biases.mean()),
         percentile_95=float(np.percentile(errors, 95)),
         worst=float(errors[worst]),
         worst_index=worst,
@@ -74,12 +76,37 @@ def compare(measured: np.ndarray, reference: np.ndarray, scale: float | None = N
     )
 
 
+def point_errors(measured: np.ndarray, reference: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:
+    """(N,) errors e_i and (N,) signed biases of each point relative to ``scale``; arrays as for ``compare``."""
+    difference = (np.asarray(measured, float) - np.asarray(reference, float)).reshape(len(reference), -1) / scale
+    return np.sqrt((difference**2).mean(axis=1)), difference.mean(axis=1)
+
+
 def noise_of_mean(first: np.ndarray, second: np.ndarray) -> float:
     """Relative RMS error of the mean of two independent renders of the same values; 0 where both are zero
     everywhere."""
     first, second = np.asarray(first, float), np.asarray(second, float)
     scale = root_mean_square((first + second) / 2)
     return root_mean_square(first - second) / (2 * scale) if scale > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class NegativeValues:
+    """How many of ``values`` are below zero, and the lowest relative to the reference's scale (0 where none is)."""
+
+    count: int
+    values: int
+    lowest: float
+
+    def as_dict(self) -> dict:
+        """Plain values for JSON."""
+        return asdict(self)
+
+
+def count_negative(measured: np.ndarray, scale: float) -> NegativeValues:
+    """Counts values of ``measured`` (any shape) below zero; ``scale`` is R."""
+    measured = np.asarray(measured, float)
+    return NegativeValues(int((measured < 0).sum()), measured.size, float(min(measured.min(initial=0.0), 0.0)) / scale)
 
 
 def root_mean_square(values: np.ndarray) -> float:

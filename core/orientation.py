@@ -27,21 +27,6 @@ def inside_solid(shares: np.ndarray) -> np.ndarray:
     return (solid > _MOST) | ((behind > _MOST) & (background == 0) & (lit == 0) & lit.any())
 
 
-def flipped_objects(sightings: np.ndarray, object_count: int) -> np.ndarray:
-    """Without light to tell, probes vote: objects that most of the probes seeing them see from behind.
-
-    (object_count,) bool from ``sightings`` (P, S): per probe, ±(object + 1) of S directions, negative from behind, 0
-    nothing."""
-    sightings = np.asarray(sightings, np.int64)
-    probe = np.broadcast_to(np.arange(len(sightings))[:, None], sightings.shape)
-    seen = sightings != 0
-    pair = probe[seen] * object_count + np.abs(sightings[seen]) - 1
-    pairs, inverse = np.unique(pair, return_inverse=True)
-    sides = np.bincount(inverse, np.sign(sightings[seen]), len(pairs))
-    votes = np.bincount(pairs % object_count, np.sign(sides), object_count)
-    return votes < 0
-
-
 class ShellVote:
     """Collects what probes see of objects' back faces, batch by batch."""
 

@@ -64,7 +64,12 @@ class ReportData:
 
 
 def write_report(path, report: ReportData) -> None:
-    """Writes ``report`` as one HTML file; it appears whole or not at all.
+    """Writes ``report`` as one HTML file; see ``write_page``."""
+    write_page(path, report_html(report))
+
+
+def write_page(path, text: str) -> None:
+    """Writes a page as one file that appears whole or not at all.
 
     Raises:
         OSError: the file cannot be written; nothing is left behind.
@@ -73,7 +78,7 @@ def write_report(path, report: ReportData) -> None:
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         # Names in a scene may hold lone surrogates, which UTF-8 cannot: show them as question marks.
-        temporary.write_bytes(report_html(report).encode("utf-8", errors="replace"))
+        temporary.write_bytes(text.encode("utf-8", errors="replace"))
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
@@ -81,12 +86,9 @@ def write_report(path, report: ReportData) -> None:
 
 def report_html(report: ReportData) -> str:
     """The page's text."""
-    style = (_HERE / "report.css").read_text(encoding="utf-8")
-    script = (_HERE / "report.js").read_text(encoding="utf-8")
-    allowed = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{allowed}'"
+    facts = [report.device, f"Blender {report.blender}" if report.blender else "", report.generator]
     sections = [
-        _header(report),
+        page_header(report.title, facts),
         _cards(report),
         _warnings(report),
         _pictures(report),
@@ -96,20 +98,29 @@ def report_html(report: ReportData) -> str:
         _settings(report),
         _summary(report),
     ]
+    return page(report.title, sections)
+
+
+def page(title: str, sections: list[str]) -> str:
+    """An HTML page with the reports' style and script; ``sections`` are HTML, empty ones are left out."""
+    style = (_HERE / "report.css").read_text(encoding="utf-8")
+    script = (_HERE / "report.js").read_text(encoding="utf-8")
+    allowed = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{allowed}'"
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(report.title)} · Gridlight</title>\n<style>\n{style}</style>\n</head>\n<body>\n<main>\n"
+        f"<title>{escape(title)} · Gridlight</title>\n<style>\n{style}</style>\n</head>\n<body>\n<main>\n"
         + "\n".join(section for section in sections if section)
         + f"\n</main>\n<script>{script}</script>\n</body>\n</html>\n"
     )
 
 
-def _header(report: ReportData) -> str:
-    facts = [report.device, f"Blender {report.blender}" if report.blender else "", report.generator]
+def page_header(title: str, facts: list[str]) -> str:
+    """The head of a page: its title and a line of facts."""
     line = " · ".join(escape(fact) for fact in facts if fact)
-    return f"<header><h1>{escape(report.title)}</h1><p>{line}</p></header>"
+    return f"<header><h1>{escape(title)}</h1><p>{line}</p></header>"
 
 
 def _cards(report: ReportData) -> str:

@@ -33,10 +33,10 @@ def write_field(path, radiance):
     return path
 
 
-def test_figures_of_a_field_that_is_two_percent_too_bright(furnace, run_gridlight):
+def test_figures_and_report_of_a_field_that_is_two_percent_too_bright(furnace, run_gridlight):
     blend, folder = furnace
     probes = write_field(folder / "bright.exr", 1.02 * EMISSION)
-    done = run_gridlight("verify", blend, probes, "--points", 4, "--spp", 1, "--height", 16)
+    done = run_gridlight("verify", blend, probes, "--points", 4, "--spp", 1, "--height", 16, "--trilinear")
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     summary = json.loads(lines[-1])
@@ -45,9 +45,38 @@ def test_figures_of_a_field_that_is_two_percent_too_bright(furnace, run_gridligh
         assert row["relative_rms"] == pytest.approx(0.02, rel=1e-2)
         assert row["bias"] == pytest.approx(0.02, rel=1e-2)
         assert row["noise"] < 1e-5
+        assert row["trilinear"]["relative_rms"] < 1e-4
+        assert row["negative"]["count"] == row["negative"]["floor"]["count"] == 0
         assert row["points"] == 4
         assert any(line.startswith(kind) for line in lines[:-1])
         assert np.abs(row["worst_position"]).max() <= 1
+    assert summary["ringing"] == {"probes": 8, "negative": 0, "lowest": 0.0}
+    assert summary["files"] == [str(folder / "bright_verify.html")]
+    text = (folder / "bright_verify.html").read_text(encoding="utf-8")
+    assert text.count("<circle") == 3 * 3 * (4 + 1)  # three kinds in three views, and the worst one ringed
+    assert text.count("+2.00 %") >= 3 * 3 * 4
+
+
+def test_light_below_zero_is_counted(furnace, run_gridlight, tmp_path):
+    """A field that is brighter above by more than its mean: below zero for every normal that looks down."""
+    blend, _ = furnace
+    field = Field.empty(Grid.from_bounds([-0.8] * 3, [0.8] * 3, (2, 2, 2)), 2)
+    field.coefficients[:, 0], field.coefficients[:, 2] = 1.0, 2.0
+    field.depth[:] = 10.0, 100.0
+    probe_file.write(tmp_path / "rings.exr", field)
+    done = run_gridlight(
+        "verify", blend, tmp_path / "rings.exr", "--points", 3, "--spp", 1, "--height", 16, "-o", tmp_path / "out"
+    )
+    assert done.returncode == 0, done.stderr
+    assert "below zero" in done.stdout
+    summary = json.loads(done.stdout.splitlines()[-1])
+    negative = summary["points"]["probes"]["negative"]
+    assert (negative["count"], negative["values"]) == (9, 54)
+    lowest = np.pi * 0.28209479177387814 - 2 * 2 * np.pi / 3 * 0.4886025119029199
+    assert negative["lowest"] == pytest.approx(lowest / (np.pi * EMISSION), rel=1e-2)
+    assert negative["floor"]["count"] == 0
+    assert summary["ringing"]["negative"] == 8
+    assert (tmp_path / "out" / "rings_verify.html").exists()
 
 
 def test_a_light_that_is_not_there_is_told(furnace, run_gridlight, tmp_path):
@@ -81,35 +110,45 @@ class TestPoints:
     """Nothing may be measured inside of solids."""
 
     @pytest.fixture(scope="class", params=["thick", "cube"])
-    def snapshot(self, request):
+    def space(self, request):
         from gridlight.scene.read import read_scene
 
-        return read_scene(scenes.cornell(request.param))
+        scene = scenes.cornell(request.param)
+        space = verify_points.FreeSpace(read_scene(scene), verify_points.cycles_light(scene))
+        space.is_free(Grid.from_bounds([-0.1] * 3, [2.9] * 3, (3, 3, 3)).positions())  # nodes vote first, as in verify
+        return space
 
-    def test_free_points_stand_in_the_room_and_outside_its_boxes(self, snapshot):
-        space = verify_points.FreeSpace(snapshot)
-        points = verify_points.free_points(space, Grid.from_bounds([0.05] * 3, [2.75] * 3, (4, 4, 4)), 200, 0)
-        assert points.shape == (200, 3)
-        assert not _in_box(points, (1.05, 1.85), 0.8, 1.55, 0.29).any()
-        assert not _in_box(points, (1.875, 0.875), 0.75, 0.75, -0.31).any()
+    def test_free_points_stand_in_the_room_and_outside_its_boxes(self, space):
+        """Also where the volume reaches into the walls and beyond them."""
+        for low, high in ((0.05, 2.75), (-0.1, 2.9)):
+            points = verify_points.free_points(space, Grid.from_bounds([low] * 3, [high] * 3, (4, 4, 4)), 100, 0)
+            assert points.shape == (100, 3)
+            assert ((points > 0) & (points < scenes.ROOM_SIZE_M)).all()
+            assert not _in_box(points, (1.05, 1.85), 0.8, 1.55, 0.29).any()
+            assert not _in_box(points, (1.875, 0.875), 0.75, 0.75, -0.31).any()
 
-    def test_the_same_seed_gives_the_same_points(self, snapshot):
+    def test_the_same_seed_gives_the_same_points(self, space):
         grid = Grid.from_bounds([0.05] * 3, [2.75] * 3, (4, 4, 4))
-        first, second = (verify_points.free_points(verify_points.FreeSpace(snapshot), grid, 20, 5) for _ in range(2))
+        first, second = (verify_points.free_points(space, grid, 20, 5) for _ in range(2))
         np.testing.assert_array_equal(first, second)
 
-    def test_surface_points_look_into_the_room(self, snapshot):
-        space = verify_points.FreeSpace(snapshot)
+    def test_surface_points_look_into_the_room(self, space):
         grid = Grid.from_bounds([0.1] * 3, [2.7] * 3, (4, 4, 4))
-        space.is_free(grid.positions())  # nodes vote first, as in verify
-        points, normals = verify_points.surface_points(space, grid, 100, 0)
-        assert len(points) == 100
+        points, normals = verify_points.surface_points(space, grid, 60, 0)
+        assert len(points) == 60
         np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, rtol=1e-9)
-        # The underside of a box that stands on a cube's face is seen from below too: no ray can tell it from free
-        # space.
-        points, normals = points[normals[:, 2] > -0.5], normals[normals[:, 2] > -0.5]
         ahead = points + 0.02 * normals
         assert ((ahead > 0) & (ahead < scenes.ROOM_SIZE_M)).all()
+
+
+def test_a_dark_room_beside_a_lit_one_is_free_space():
+    """What leaks into it must be measured."""
+    from gridlight.scene.read import read_scene
+
+    scene = scenes.lit_and_dark_rooms()
+    space = verify_points.FreeSpace(read_scene(scene), verify_points.cycles_light(scene))
+    points = np.array([[1.0, 1.0, 1.0], [3.6, 1.2, 1.5], [4.9, 0.2, 0.3], [2.55, 1.0, 1.0], [1.0, 1.0, -0.1]])
+    np.testing.assert_array_equal(space.is_free(points), [True, True, True, False, False])
 
 
 def _in_box(points, middle, width, height, turn):

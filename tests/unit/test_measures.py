@@ -55,3 +55,15 @@ def test_noise_of_mean_of_two_renders():
 def test_what_cannot_be_compared_is_refused(measured, reference):
     with pytest.raises(ValueError):
         measures.compare(measured, reference)
+
+
+def test_points_have_errors_and_biases_of_their_own():
+    errors, biases = measures.point_errors(np.array([[1.0, 3.0], [2.0, 2.0]]), np.full((2, 2), 2.0), scale=2.0)
+    np.testing.assert_allclose(errors, [0.5, 0.0])
+    np.testing.assert_allclose(biases, [0.0, 0.0])
+
+
+def test_values_below_zero_are_counted():
+    found = measures.count_negative(np.array([[-0.5, 1.0], [0.0, -1.0]]), scale=2.0)
+    assert found.as_dict() == {"count": 2, "values": 4, "lowest": -0.5}
+    assert measures.count_negative(np.zeros((0, 3)), 1.0).lowest == 0.0
