@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What building, refitting and instancing cost a ray: tables of docs/measurements.md, printed with ``-s``, and what they
-must keep to."""
+"""What building, refitting and instancing cost a ray: tables of docs/measurements.md, printed with -s, and bounds."""
 
 import time
 
