@@ -72,6 +72,11 @@ class SceneTextures:
             self._textures["image_table"] = upload(table, "images")
             self._textures["image_texels"] = upload(texels, "image texels", "RGBA16F")
 
+    def set_lights(self, lights: list[Light], origin: np.ndarray) -> None:
+        """Other lights for the same surfaces."""
+        self._textures["lights"] = upload(pack_lights(lights, origin), "lights")
+        self.light_count = len(lights)
+
     @property
     def surface_defines(self) -> dict:
         """For shaders that ask what surfaces are made of, and may trace rays."""

@@ -11,9 +11,11 @@ from bpy.props import (
     FloatProperty,
     IntProperty,
     PointerProperty,
+    StringProperty,
 )
 
 from ..core.settings import FACE_SIZES, BakeSettings
+from .export_targets import TARGET_ITEMS
 from .object_properties import GridlightLight, GridlightVolume
 from .quality import QUALITIES
 
@@ -85,6 +87,15 @@ class GridlightPreview(bpy.types.PropertyGroup):
         max=4.0,
         options=set(),
     )
+    highlight: FloatProperty(
+        name="Highlight",
+        description="Share of direct light that surfaces mirror in a soft highlight, for looking only; paint, plastics "
+        "and glass mirror 0.04 of it head-on",
+        default=0.04,
+        min=0.0,
+        max=1.0,
+        options=set(),
+    )
     show_probes: BoolProperty(name="Probes", description="Show each probe as a sphere in its own light", options=set())
     probe_size: FloatProperty(
         name="Size",
@@ -133,6 +144,30 @@ def _set_quality(self, index: int) -> None:
     if not self.custom:
         for name, value in list(QUALITIES.values())[index].settings.items():
             setattr(self, name, value)
+
+
+class GridlightExport(bpy.types.PropertyGroup):
+    """Where baked light goes, and how."""
+
+    target: EnumProperty(name="Format", description="What the files are for", items=TARGET_ITEMS, options=set())
+    directory: StringProperty(
+        name="Folder",
+        description="Where the files go. // is the folder of this .blend",
+        default="//gridlight",
+        subtype="DIR_PATH",
+        options=set(),
+    )
+    dering: BoolProperty(
+        name="Deringing",
+        description="Dampen probes whose light would be negative in some directions, as little as that takes",
+        options=set(),
+    )
+    scale: FloatProperty(
+        name="Scale", description="Units of the engine per metre", default=1.0, min=1e-4, max=1e4, options=set()
+    )
+    gain: FloatProperty(
+        name="Gain", description="Factor on all light that is written", default=1.0, min=1e-6, max=1e6, options=set()
+    )
 
 
 class GridlightSettings(bpy.types.PropertyGroup):
@@ -240,6 +275,7 @@ class GridlightSettings(bpy.types.PropertyGroup):
         options=set(),
     )
     preview: PointerProperty(type=GridlightPreview)
+    export: PointerProperty(type=GridlightExport)
     active_light: IntProperty(name="Light", description="Light that is chosen in the list", options={"HIDDEN"})
 
     def bake_settings(self) -> BakeSettings:
@@ -262,7 +298,7 @@ class GridlightSettings(bpy.types.PropertyGroup):
         )
 
 
-classes = (GridlightPreview, GridlightSettings, GridlightLight, GridlightVolume)
+classes = (GridlightPreview, GridlightExport, GridlightSettings, GridlightLight, GridlightVolume)
 
 
 def attach() -> None:

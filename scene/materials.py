@@ -7,6 +7,8 @@ per material (the base colour's, else the opacity's, else the emission's) and at
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 
@@ -30,12 +32,18 @@ class MaterialTable:
         self.domains: list[Domain] = []  # the texture mapping of each material, to be applied to its corners' UVs
         self._images = images
         self._notices = notices
-        self._indices: dict[int, int] = {}
+        self._indices: dict[tuple[int, float], int] = {}
 
-    def index(self, material: bpy.types.Material | None) -> int:
-        """Row of ``material``; None is Blender's default grey surface."""
-        key = material.as_pointer() if material is not None else 0
-        if key not in self._indices:
+    def index(self, material: bpy.types.Material | None, intensity: float = 1.0) -> int:
+        """Row of ``material`` with its emission times ``intensity``; None is Blender's default grey surface."""
+        key = (material.as_pointer() if material is not None else 0, intensity)
+        if key not in self._indices and intensity != 1.0:
+            own = self.index(material)
+            row = self.materials[own]
+            self._indices[key] = len(self.materials)
+            self.materials.append(replace(row, emission=tuple(value * intensity for value in row.emission)))
+            self.domains.append(self.domains[own])
+        elif key not in self._indices:
             self._indices[key] = len(self.materials)
             if material is None:
                 self._append("", Closure(DEFAULT_GREY), CLIP_THRESHOLD, False)

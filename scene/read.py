@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from ..core.snapshot import SceneSnapshot
+from ..core.snapshot import Light, SceneSnapshot, World
 from .camera import read_camera
 from .evaluation import as_in_viewport, at_render_quality, rendered_objects
 from .geometry import MeshArrays, WorldTriangles, place, read_mesh
 from .images import ImageTable
-from .lights import LightTable
+from .lights import INTENSITY_PROPERTY, LightTable
 from .materials import MaterialTable, apply_domain
 from .notices import Notices
 from .volumes import find_volumes
@@ -35,6 +35,7 @@ class _Instances:
 
     mesh: MeshArrays
     materials: list[bpy.types.Material | None]  # per slot, original datablocks
+    intensity: float  # factor on emission
     matrices: list[np.ndarray] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
 
@@ -78,7 +79,30 @@ def read_scene(
             scene.frame_set(own_frame, subframe=own_subframe)
 
 
-def _read(scene, view_layer, evaluate) -> SceneSnapshot:
+def read_evaluated(depsgraph: bpy.types.Depsgraph, world: World) -> SceneSnapshot:
+    """The scene as ``depsgraph`` has it: for render engines, inside whose callbacks nothing else can be evaluated.
+
+    ``world`` is the background, which may take a render to find out.
+    """
+    return _read(depsgraph.scene, depsgraph.view_layer, lambda _scene, _layer, visit: visit(depsgraph), world)
+
+
+def read_lights(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Light]:
+    """The lights of ``read_scene(live=True)`` alone, in a fraction of the time."""
+    notices = Notices()
+    rigid_bodies = scene.rigidbody_world is not None
+    harvest = as_in_viewport(
+        scene,
+        view_layer,
+        lambda depsgraph: _harvest(depsgraph, rendered_objects(view_layer), rigid_bodies, notices, meshes=False),
+    )
+    lights = LightTable(ImageTable(notices), notices)
+    for item, matrix, name in harvest.lights:
+        lights.add(item, matrix, name)
+    return lights.lights
+
+
+def _read(scene, view_layer, evaluate, world: World | None = None) -> SceneSnapshot:
     notices = Notices()
     harvest = evaluate(
         scene,
@@ -104,7 +128,7 @@ def _read(scene, view_layer, evaluate) -> SceneSnapshot:
         materials=materials.materials,
         images=images.images,
         lights=lights.lights,
-        world=read_world(scene, notices),
+        world=world or read_world(scene, notices),
         volumes=find_volumes(scene),
         camera=read_camera(scene),
         exposure=float(scene.view_settings.exposure),
@@ -114,7 +138,9 @@ def _read(scene, view_layer, evaluate) -> SceneSnapshot:
     )
 
 
-def _harvest(depsgraph: bpy.types.Depsgraph, rendered: set[int], rigid_bodies: bool, notices: Notices) -> _Harvest:
+def _harvest(
+    depsgraph: bpy.types.Depsgraph, rendered: set[int], rigid_bodies: bool, notices: Notices, meshes: bool = True
+) -> _Harvest:
     """Take meshes, lights and their places out of ``depsgraph``.
 
     Args:
@@ -131,7 +157,7 @@ def _harvest(depsgraph: bpy.types.Depsgraph, rendered: set[int], rigid_bodies: b
             continue
         if item.type in _WITHOUT_SURFACE:
             notices.group(f"{_WITHOUT_SURFACE[item.type]} are not supported and are left out", item.name)
-        if item.type not in ("MESH", "LIGHT"):
+        if item.type not in ("MESH", "LIGHT") or not (meshes or item.type == "LIGHT"):
             continue
         simulated = rigid_bodies and not instance.is_instance and not item.hide_viewport
         matrix = np.array(item.original.matrix_world if simulated else instance.matrix_world, dtype=np.float64)
@@ -172,10 +198,11 @@ def _add_mesh(harvest: _Harvest, item: bpy.types.Object, matrix: np.ndarray, nam
         if arrays.needles:
             notices.group("triangles without area are left out", f"{name} ({arrays.needles})")
     slots = _slot_materials(item, mesh)
-    group_key = (key, *(material.as_pointer() if material else 0 for material in slots))
+    intensity = float(item.get(INTENSITY_PROPERTY, 1.0))
+    group_key = (key, intensity, *(material.as_pointer() if material else 0 for material in slots))
     group = harvest.groups.get(group_key)
     if group is None:
-        group = harvest.groups[group_key] = _Instances(harvest.meshes[key], slots)
+        group = harvest.groups[group_key] = _Instances(harvest.meshes[key], slots, intensity)
     group.matrices.append(matrix)
     group.names.append(name)
 
@@ -193,7 +220,7 @@ def _slot_materials(item: bpy.types.Object, mesh: bpy.types.Mesh) -> list[bpy.ty
 def _assemble(group: _Instances, slots, materials: MaterialTable, first_object: int, notices: Notices) -> dict | None:
     """World triangles of ``group`` with their per-triangle arrays; None where nothing is left."""
     mesh = group.mesh
-    rows = np.array([materials.index(material) for material in slots] or [materials.index(None)], np.int32)
+    rows = np.array([materials.index(material, group.intensity) for material in slots or [None]], np.int32)
     used = rows[np.clip(mesh.slots, 0, len(rows) - 1)]
     uvs = _corner_uvs(mesh, used, materials, group.names[0], notices)
     visible = ~np.isin(used, [row for row in np.unique(used) if materials.is_hole(row)])

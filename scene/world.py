@@ -45,6 +45,16 @@ def read_world(scene: bpy.types.Scene, notices: Notices) -> World:
     return _read_directly(world, surface) or World(map=_rendered(scene, world))
 
 
+def needs_render(scene: bpy.types.Scene) -> bool:
+    """Whether ``read_world`` has to render to find out, which cannot be done while Blender renders."""
+    world = scene.world
+    if world is None or world.node_tree is None or not world.use_nodes or not world.cycles_visibility.diffuse:
+        return False
+    output = active_output(world.node_tree, "ShaderNodeOutputWorld")
+    surface = find_socket(output.inputs, "Surface") if output else None
+    return surface is not None and surface.is_linked and _read_directly(world, surface) is None
+
+
 def _read_directly(world: bpy.types.World, surface: bpy.types.NodeSocket) -> World | None:
     """The world of a Background node with a colour or an environment image; None where only a render can tell."""
     ignored = Notices()  # what cannot be evaluated here is rendered, so there is nothing to warn of
