@@ -9,9 +9,10 @@ from pathlib import Path
 import gpu
 
 from ..core.errors import NoGpuError
-from . import create_infos, viewport_create_infos
+from . import create_infos, relight_create_infos, viewport_create_infos
 
 _GLSL = Path(__file__).parent / "glsl"
+_BINDINGS = (create_infos, relight_create_infos, viewport_create_infos)
 
 # Never emptied: in Blender 4.5 and 5.0 the address of a freed shader can be reused, and the old program then runs
 # silently.
@@ -19,7 +20,7 @@ _programs: dict[tuple, gpu.types.GPUShader] = {}
 
 
 def program(name: str, **defines) -> gpu.types.GPUShader:
-    """The compiled shader ``name`` (a function of ``create_infos`` or ``viewport_create_infos``) with ``defines``.
+    """The compiled shader ``name`` (a function of one of the modules of bindings) with ``defines``.
 
     A define of None or False is left out, True is defined empty.
 
@@ -40,8 +41,8 @@ def _compile(name: str, defines: dict) -> gpu.types.GPUShader:
     info.define("SHARED_", "shared")
     for key, value in defines.items():
         info.define(key, "" if value is True else str(value))
-    bindings = viewport_create_infos if hasattr(viewport_create_infos, name) else create_infos
-    stages = getattr(bindings, name)(info, defines)
+    bindings = next(getattr(module, name) for module in _BINDINGS if hasattr(module, name))
+    stages = bindings(info, defines)
     for stage, files in stages.items():
         getattr(info, f"{stage}_source")("\n".join(_source(file) for file in files))
     try:
