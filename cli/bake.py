@@ -83,6 +83,11 @@ def add_settings(parser) -> None:
     group.add_argument(
         "--seed", metavar="N", type=int, default=standard.seed, help="of the sampling (default %(default)s)"
     )
+    group.add_argument(
+        "--deringing",
+        action="store_true",
+        help="flatten the probes whose series makes irradiance negative, each as little as it takes",
+    )
     group.add_argument("--keep-all", action="store_true", help="bake every probe, cull none")
     group.add_argument(
         "--memory",
@@ -106,6 +111,7 @@ def settings_from(args) -> BakeSettings:
         seed=args.seed,
         keep_all=args.keep_all,
         memory_mib=args.memory,
+        deringing=args.deringing,
     )
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.conventions import ACTIVE, CULLED, INVALID, LUMINANCE
+from ..core.ringing import ringing
 from ..formats import probe_file
 
 HELP = "what a probe file holds"
@@ -41,6 +42,7 @@ def summarise(field) -> dict:
         "mean_radiance": None
         if not len(mean)
         else {"min": float(mean.min()), "mean": float(mean.mean()), "max": float(mean.max())},
+        "ringing": ringing(field.coefficients[active]).as_dict(),
     }
     summary.setdefault("warnings", [])
     return summary
@@ -63,6 +65,12 @@ def _text(path: str, summary: dict) -> str:
     if light:
         lines.append(
             f"  radiance   mean per active probe {light['min']:.4g} to {light['max']:.4g}, average {light['mean']:.4g}"
+        )
+    rings = summary["ringing"]
+    if rings["negative"]:
+        lines.append(
+            f"  ringing    irradiance falls below zero at {rings['negative']} of {rings['probes']} active probes, "
+            f"lowest {100 * rings['lowest']:.3g} % of the probe's mean; bake with --deringing to flatten them"
         )
     if "device" in summary:
         lines.append(f"  device     {summary['device']}")

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 from contextlib import contextmanager
 
@@ -14,10 +13,13 @@ from ..bake.job import BakeResult, run_bake
 from ..bake.preview import write_previews
 from ..core.conventions import ACTIVE, CULLED, INVALID
 from ..core.errors import InputError
+from ..core.field import Field
 from ..core.grid import Grid
+from ..core.ringing import dering, ringing
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..formats import probe_file, probe_metadata
+from ..formats.file_names import volume_endings
 from ..formats.report import ReportData, VolumeReport, write_report
 from ..formats.staging import StagedFolder
 from ..gpu_shaders.context import device_description, ensure_context
@@ -79,6 +81,8 @@ def bake_volumes(
             reporter.note(f"volume '{grid.name}'")
         result = run_bake(snapshot, grid, settings, reporter, should_stop)
         stopwatch.add(result.seconds)
+        if settings.deringing:
+            result.notes.append(_dering(result.field))
         for warning in result.warnings:
             reporter.warn(warning)
         for note in result.notes:
@@ -90,6 +94,17 @@ def bake_volumes(
             )
         results.append(result)
     return results
+
+
+def _dering(field: Field) -> str:
+    """Windows ``field`` where it rings; returns what to say about it."""
+    window = dering(field.coefficients)
+    field.coefficients = window.coefficients
+    done = window.as_dict()
+    return (
+        f"deringing: {done['windowed']} of {done['probes']} probes flattened, the strongest to "
+        f"{done['least_factor']:.2f} of its contrast; irradiance changed by {100 * window.damage:.2g} % of its RMS"
+    )
 
 
 def write_results(
@@ -104,7 +119,7 @@ def write_results(
 ) -> tuple[dict, int]:
     """Stages probe files, pictures and report in ``folder``. Returns (summary, exit status)."""
     device = device_description()
-    names = volume_names([result.field.grid for result in results])
+    names = volume_endings([result.field.grid.name for result in results])
     images = []
     with stopwatch.measure("write"):
         reporter.phase("write")
@@ -163,6 +178,7 @@ def _unsettled(result: BakeResult, settings: BakeSettings) -> bool:
 
 def _summary(results, device: str, settings: BakeSettings, stopwatch: Stopwatch, reporter) -> dict:
     states = np.concatenate([result.field.state for result in results])
+    lit = np.concatenate([result.field.coefficients[result.field.state == ACTIVE] for result in results])
     return {
         "probes": {
             "total": len(states),
@@ -172,29 +188,10 @@ def _summary(results, device: str, settings: BakeSettings, stopwatch: Stopwatch,
         },
         "iterations": max(result.iterations for result in results),
         "converged": all(result.converged for result in results),
+        "ringing": ringing(lit).as_dict(),
         "seconds": stopwatch.totals(),
         "device": device,
         "settings": settings.as_dict(),
         "files": [],
         "warnings": reporter.warnings,
     }
-
-
-def volume_names(grids: list[Grid]) -> list[str]:
-    """What tells the files of several volumes apart, ``_<name>`` each: safe on every file system, all different.
-
-    Nothing for a single volume, whose files are ``probes.exr`` and so on.
-    """
-    if len(grids) == 1:
-        return [""]
-    names = []
-    taken = set()
-    for grid in grids:
-        stem = re.sub(r"[^\w.-]+", "_", grid.name).strip("._")[:64] or "volume"
-        name, number = stem, 1
-        while name.casefold() in taken:  # some file systems do not tell upper from lower case
-            number += 1
-            name = f"{stem}_{number}"
-        taken.add(name.casefold())
-        names.append(f"_{name}")
-    return names

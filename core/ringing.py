@@ -22,9 +22,11 @@ import numpy as np
 
 from .conventions import COSINE_LOBE, MAX_BANDS, band_of
 
-_HALVINGS = 32  # of intervals of relative values: beyond float32
+_HALVINGS = 28  # of the dual's interval: the minimum is off by its square
 _GOLDEN = (np.sqrt(5) - 1) / 2
-_GOLDEN_STEPS = 16  # shrink an interval to 1/2200
+_GOLDEN_STEPS = 10  # shrink an interval to 1/120; about the least damage the ratio hardly matters
+_FACTOR_HALVINGS = 17  # factors are exact to 1e-5
+_PROBES_AT_ONCE = 1 << 14
 _ROUNDING = 1e-6  # of the mean irradiance: less below zero than this is float32
 
 
@@ -66,12 +68,16 @@ def least_irradiance(coefficients: np.ndarray) -> np.ndarray:
 
 def ringing(coefficients: np.ndarray) -> Ringing:
     """Counts the probes of ``coefficients`` (N, K, 3) whose irradiance is negative somewhere."""
-    coefficients = np.asarray(coefficients, float)
-    mean = _mean_irradiance(coefficients)
-    relative = np.where(mean > 0, least_irradiance(coefficients) / np.where(mean > 0, mean, 1.0), 0.0)
-    below = (relative < -_ROUNDING) | (mean < 0)
-    lowest = float(relative[below].min(initial=0.0))
-    return Ringing(len(coefficients), int(below.any(axis=1).sum()), lowest)
+    negative, lowest = 0, 0.0
+    for start in range(0, len(coefficients), _PROBES_AT_ONCE):
+        part = np.asarray(coefficients[start : start + _PROBES_AT_ONCE], float)
+        mean = _mean_irradiance(part)
+        may = np.flatnonzero(_may_ring(part))
+        below = _relative_minimum(part[may], mean[may])
+        rings = (below < -_ROUNDING) | (mean[may] < 0)
+        negative += int(rings.any(axis=1).sum())
+        lowest = min(lowest, float(below[rings].min(initial=0.0)))
+    return Ringing(len(coefficients), negative, lowest)
 
 
 def dering(coefficients: np.ndarray) -> Window:
@@ -83,13 +89,28 @@ def dering(coefficients: np.ndarray) -> Window:
     original = np.asarray(coefficients, float)
     factors = np.ones((len(original), 2))
     mean = _mean_irradiance(original)
-    limit = np.where(mean > 0, -_ROUNDING * mean, -np.inf)
-    rings = (least_irradiance(original) < limit).any(axis=1)
-    if rings.any():
-        factors[rings] = _least_damage(original[rings], limit[rings])
+    rings = np.flatnonzero(_may_ring(original))
+    rings = rings[(_relative_minimum(original[rings], mean[rings]) < -_ROUNDING).any(axis=1)]
+    for start in range(0, len(rings), _PROBES_AT_ONCE):
+        part = rings[start : start + _PROBES_AT_ONCE]
+        factors[part] = _least_damage(original[part], np.where(mean[part] > 0, -_ROUNDING * mean[part], -np.inf))
     bands = int(round(np.sqrt(original.shape[1])))
     windowed = original * band_factors(factors, bands)[:, :, None]
     return Window(windowed.astype(np.asarray(coefficients).dtype), factors, _damage(original, windowed))
+
+
+def _relative_minimum(coefficients: np.ndarray, mean: np.ndarray) -> np.ndarray:
+    """(N, 3) least irradiance over the ``mean`` (N, 3); 0 where that is not positive."""
+    return np.where(mean > 0, least_irradiance(coefficients) / np.where(mean > 0, mean, 1.0), 0.0)
+
+
+def _may_ring(coefficients: np.ndarray) -> np.ndarray:
+    """(N,) bool: false where the norms of the bands leave no room for a negative direction. The least eigenvalue of a
+    traceless symmetric M is not below −√⅔ |M|."""
+    first = np.sqrt((coefficients[:, 1:4] ** 2).sum(axis=1)) * (COSINE_LOBE[1] * 0.4886025119029199)
+    # a unit coefficient of the third band is a matrix of Frobenius norm ½ √(15/2π)
+    second = np.sqrt((coefficients[:, 4:9] ** 2).sum(axis=1)) * (COSINE_LOBE[2] * np.sqrt(15 / (2 * np.pi)) / 2)
+    return (_mean_irradiance(coefficients) < first + np.sqrt(2 / 3) * second).any(axis=1)
 
 
 def band_factors(factors: np.ndarray, bands: int) -> np.ndarray:
@@ -115,7 +136,7 @@ def _least_damage(coefficients: np.ndarray, limit: np.ndarray) -> np.ndarray:
         step = np.minimum(np.stack([2 * ratio, 2 - 2 * ratio], axis=1), 1.0)
         low, high = np.zeros(len(ratio)), np.ones(len(ratio))
         does = (quadratic.minimum(1 - step) >= limit).all(axis=1)
-        for _ in range(_HALVINGS):
+        for _ in range(_FACTOR_HALVINGS):
             middle = (low + high) / 2
             good = (quadratic.minimum(1 - middle[:, None] * step) >= limit).all(axis=1)
             low, high = np.where(good, low, middle), np.where(good, middle, high)
@@ -124,11 +145,18 @@ def _least_damage(coefficients: np.ndarray, limit: np.ndarray) -> np.ndarray:
         return factors, np.where(does, cost, (1 + np.abs(ratio - 0.5)) * power.sum(axis=1))
 
     low, high = np.zeros(len(coefficients)), np.ones(len(coefficients))
+    left, right = 1 - _GOLDEN + low, _GOLDEN + low
+    left_cost, right_cost = best_along(left)[1], best_along(right)[1]
     for _ in range(_GOLDEN_STEPS):
-        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-        left_is_better = best_along(left)[1] <= best_along(right)[1]
-        low, high = np.where(left_is_better, low, left), np.where(left_is_better, right, high)
-    return best_along((low + high) / 2)[0]
+        good = left_cost <= right_cost
+        low, high = np.where(good, low, left), np.where(good, right, high)
+        kept, kept_cost = np.where(good, left, right), np.where(good, left_cost, right_cost)
+        fresh = low + high - kept
+        fresh_cost = best_along(fresh)[1]
+        below = fresh < kept
+        left, right = np.where(below, fresh, kept), np.where(below, kept, fresh)
+        left_cost, right_cost = np.where(below, fresh_cost, kept_cost), np.where(below, kept_cost, fresh_cost)
+    return best_along(np.where(left_cost <= right_cost, left, right))[0]
 
 
 def _mean_irradiance(coefficients: np.ndarray) -> np.ndarray:

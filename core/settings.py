@@ -30,6 +30,7 @@ class BakeSettings:
     seed: int = 0
     keep_all: bool = False
     memory_mib: int = 512
+    deringing: bool = False  # window the probes whose irradiance falls below zero (core/ringing.py)
 
     def __post_init__(self):
         _check("--bands", self.bands, 1, 4)

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..core.conventions import ACTIVE, LUMINANCE
 from ..core.field import Field
+from ..core.ringing import ringing
 from ..core.spherical_harmonics import irradiance
 from . import report_figures as figures
 from .report_slices import slices_html
@@ -228,8 +229,18 @@ def _numbers(baked: Field) -> str:
         "brightest hundredth above": f"{figures.number(high)} W/m²",
         "lowest validity of an active probe": figures.number(float(baked.validity[baked.state == ACTIVE].min())),
         "probes moved out of surfaces": str(int((np.abs(baked.offset).max(axis=1) > 0).sum())),
+        "probes with irradiance below zero": _ringing(baked),
     }
     return _table(rows)
+
+
+def _ringing(baked: Field) -> str:
+    found = ringing(baked.coefficients[baked.state == ACTIVE])
+    return (
+        f"{found.negative}, lowest {figures.number(100 * found.lowest)} % of the probe's mean"
+        if found.negative
+        else "0"
+    )
 
 
 def _timings(report: ReportData) -> str:

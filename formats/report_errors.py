@@ -97,29 +97,28 @@ def _cards(kinds: list[KindOfPoints]) -> str:
 
 
 def _table(kinds: list[KindOfPoints], bands: int) -> str:
-    heads = ("", "points", "relative RMS", "bias", "95th percentile", "worst", "noise", f"floor of {bands} bands")
-    heads += ("plain trilinear", "below zero", "of the basis")
+    with_trilinear = any(kind.trilinear for kind in kinds)
+    heads = ["", "points", "relative RMS", "bias", "95th", "worst", "noise", f"floor, {bands} bands"]
+    heads += ["trilinear"] * with_trilinear + ["below zero", "of the basis"]
     rows = []
     for kind in kinds:
-        trilinear = _percent(kind.trilinear.relative_rms) if kind.trilinear else "not asked for"
-        values = (
-            str(kind.figures.points),
-            _percent(kind.figures.relative_rms),
-            _percent(kind.figures.bias, True),
-            _percent(kind.figures.percentile_95),
-            _percent(kind.figures.worst),
-            _percent(kind.noise),
-            _percent(kind.floor.relative_rms),
-            trilinear,
-            f"{kind.negative.count} of {kind.negative.values}, lowest {_percent(kind.negative.lowest)}",
-            f"{kind.negative_floor.count}, lowest {_percent(kind.negative_floor.lowest)}",
-        )
+        figures = kind.figures
+        values = [str(figures.points), _percent(figures.relative_rms), _percent(figures.bias, True)]
+        values += [_percent(value) for value in (figures.percentile_95, figures.worst, kind.noise)]
+        values += [
+            _percent(row.relative_rms) if row else "" for row in (kind.floor, kind.trilinear)[: 1 + with_trilinear]
+        ]
+        values += [f"{part.count} of {part.values}" for part in (kind.negative, kind.negative_floor)]
         rows.append(f"<tr><th>{escape(kind.name)}</th>{''.join(f'<td>{value}</td>' for value in values)}</tr>")
+    notes = [
+        "In % of the RMS of the reference. Noise is the reference's own.",
+        "Floor: a perfect probe standing at the point itself.",
+        *["Trilinear: perfect probes at the nodes, plain trilinear lookup."] * with_trilinear,
+        "Below zero: values of irradiance that the series made negative, and how many a perfect probe would.",
+    ]
     return (
-        f"<table><tr>{''.join(f'<th>{head}</th>' for head in heads)}</tr>{''.join(rows)}</table>"
-        '<p class="legend">In % of the RMS of the reference. Noise is the reference\'s own. Floor: a perfect probe '
-        "standing at the point itself. Plain trilinear: perfect probes at the nodes. Below zero: values of irradiance "
-        "that the series made negative, and how many a perfect probe there would.</p>"
+        f'<div style="overflow-x:auto"><table><tr>{"".join(f"<th>{head}</th>" for head in heads)}</tr>'
+        f'{"".join(rows)}</table></div><p class="legend">{" ".join(notes)}</p>'
     )
 
 
