@@ -2,8 +2,8 @@
 """Where a grid is too coarse for its light, told from the field alone.
 
 Interpolating linearly between nodes a distance h apart is off by at most h²/8 times the second derivative of what is
-interpolated. The second difference of three probes in a row is h² times that derivative, so an eighth of it, as a share of
-the light there, estimates what a cell gets wrong. It does not know about errors of the probes themselves.
+interpolated. The second difference of three probes in a row is h² times that derivative, so an eighth of it, as a share
+of the light there, estimates what a cell gets wrong. It does not know about errors of the probes themselves.
 """
 
 from __future__ import annotations

@@ -14,7 +14,8 @@ from .textures import upload
 
 
 class FieldTextures:
-    """What shaders read of one field. Its frame is the grid's centre; ``offset`` leads there from the scene's origin."""
+    """What shaders read of one field. Its frame is the grid's centre; ``offset`` leads there from the scene's
+    origin."""
 
     def __init__(self, field: Field, origin: np.ndarray):
         """``origin`` (3,): what the scene's textures are relative to, world metres."""
@@ -57,8 +58,8 @@ class FieldTextures:
         shader.uniform_block("grid_info", self._grid_info)
 
     def spheres(self, eye: np.ndarray, radius: float, most: int) -> np.ndarray:
-        """(S, 4) float32: centres of the ``most`` probes nearest to ``eye`` (3,) in the scene's frame, node index, or −1
-        where culled, −2 where invalid. Probes right before the eye are left out: they would hide the picture."""
+        """(S, 4) float32: centres of the ``most`` probes nearest to ``eye`` (3,) in the scene's frame; node index, or
+        −1 where culled, −2 where invalid. Probes right before the eye are left out: they would hide the picture."""
         field = self.field
         marks = np.where(field.state == ACTIVE, np.arange(len(field.state)), np.where(field.state == CULLED, -1, -2))
         centres = np.concatenate([self.positions + self.offset, marks[:, None]], axis=1)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The scene rasterised in a view and shaded per pixel: what the viewport and the render engine draw.
 
-A picture is the mean of samples that differ in where pixels are looked at and where on the lights shadow rays end. Each sample is a
-pass for depth alone and one that shades the nearest surface of every pixel, so no shadow ray is traced for what is hidden.
+A picture is the mean of samples that differ in where pixels are looked at and where on the lights shadow rays end. Each
+sample is a pass for depth alone and one that shades the nearest surface of every pixel, so no shadow ray is traced for
+what is hidden.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from ..core.snapshot import World
 from ..core.view import View
 from .programs import program
 from .scene_textures import SceneTextures
-from .textures import upload
+from .textures import read, upload
 from .viewport_field import NO_FIELD, FieldTextures
 from .viewport_shading import BACKGROUND_FACE, Shading, background_texture, uniform_block, view_block
 
@@ -59,8 +60,9 @@ class Picture:
         ]
         self.samples = 0
 
-    def restart(self) -> None:
-        self.samples = 0
+    def wait(self) -> None:
+        """Returns when the GPU has drawn everything so far."""
+        self._framebuffers[0][0].read_color(0, 0, 1, 1, 4, 0, "FLOAT")
 
     def begin(self) -> gpu.types.GPUFrameBuffer:
         """The framebuffer of the next sample, with its depth cleared."""
@@ -69,6 +71,13 @@ class Picture:
             self.sums.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
         depth.clear(format="FLOAT", value=(1.0,))
         return framebuffer
+
+    def read(self) -> np.ndarray:
+        """(height, width, 4) float32 mean radiance of what is covered, and coverage; row 0 at the bottom."""
+        values = read(self.sums, self.width * self.height).reshape(self.height, self.width, 4)
+        values[..., :3] /= np.maximum(values[..., 3:], 1.0)
+        values[..., 3] = np.minimum(values[..., 3] / max(self.samples, 1), 1.0)
+        return values
 
     def jitter(self) -> tuple[float, float]:
         """Where the next sample looks within pixels, in clip space."""

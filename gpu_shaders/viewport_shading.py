@@ -35,6 +35,11 @@ class Shading:
         """Whether the world behind the scene belongs to the picture."""
         return MODES.index(self.mode) <= MODES.index("INDIRECT")
 
+    @property
+    def shows_amounts(self) -> bool:
+        """Whether what is shown is light, to be exposed, and not data as colours."""
+        return MODES.index(self.mode) <= MODES.index("IRRADIANCE")
+
     def block(self, field_offset: np.ndarray) -> gpu.types.GPUUniformBuf:
         """``shade_info`` for a field whose centre is at ``field_offset`` (3,) in the scene's frame."""
         rows = np.zeros((2, 4), np.float32)

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Words over the view: what is shown, how fast, how old the light is, and what colours of data modes mean."""
+
+from __future__ import annotations
+
+import blf
+import bpy
+import gpu
+from gpu_extras.batch import batch_for_shader
+
+from .sessions import SceneSession
+
+_SIZE, _LEADING, _MARGIN = 12, 1.5, 16
+_TEXT = (1.0, 1.0, 1.0, 0.95)
+_SHADOW = (0.0, 0.0, 0.0, 0.8)
+# As viewport_data_lib.glsl colours them.
+HEAT = [(0.08, 0.1, 0.45), (0.1, 0.6, 0.85), (0.2, 0.75, 0.25), (0.95, 0.85, 0.15), (0.85, 0.1, 0.08)]
+HEAT_END_PERCENT = 20
+_STATES = [
+    ((0.2, 0.75, 0.3), "sees free space"),
+    ((0.95, 0.5, 0.05), "sees back faces"),
+    ((0.8, 0.08, 0.1), "invalid: in a solid"),
+    ((0.25, 0.35, 0.65), "culled: lights nothing"),
+]
+
+
+def draw(context: bpy.types.Context, session: SceneSession, preview) -> None:
+    """Draws into the region of ``context``, in pixels."""
+    scale = context.preferences.system.ui_scale
+    left, bottom = _corner(context)
+    line = _SIZE * _LEADING * scale
+    for row, text in enumerate(reversed(lines(context, session, preview))):
+        write(text, left, bottom + row * line, scale)
+    if preview.mode == "ERROR":
+        _heat_legend(left, bottom + 5 * line, scale)
+    elif preview.mode == "VALIDITY":
+        _state_legend(left, bottom + 4 * line, line, scale)
+
+
+def lines(context: bpy.types.Context, session: SceneSession, preview) -> list[str]:
+    """The readout, from top to bottom."""
+    if session.message:
+        return [f"Gridlight: {session.message}"]
+    if session.gpu is None:
+        return ["Gridlight: reading the scene"]
+    shown = []
+    if not session.gpu.fields:
+        shown.append("Gridlight: no baked light yet, direct light alone")
+    settings = context.scene.view_settings
+    if settings.view_transform != "Standard" and preview.mode in ("FULL", "DIRECT", "INDIRECT", "IRRADIANCE"):
+        shown.append(f"The preview's colours are those of Standard; this scene renders with {settings.view_transform}")
+    if preview.show_rate:
+        readout = session.readout
+        rate = f"{readout.frames_per_second:.0f} frames/s"
+        age = f"light {readout.age_seconds:.1f} s old" if readout.age_seconds else "light up to date"
+        shown.append(f"{rate}, {readout.probes_per_frame} probes/frame, {age}")
+    return shown
+
+
+def write(text: str, x: float, y: float, scale: float, color=_TEXT, size: int = _SIZE) -> None:
+    """One line of text with its left end at ``x``, its base line at ``y``, in pixels."""
+    font = 0
+    blf.size(font, size * scale)
+    blf.enable(font, blf.SHADOW)
+    blf.shadow(font, 3, *_SHADOW)
+    blf.color(font, *color)
+    blf.position(font, x, y, 0)
+    blf.draw(font, text)
+    blf.disable(font, blf.SHADOW)
+
+
+def rectangle(left: float, bottom: float, right: float, top: float, color) -> None:
+    """A filled rectangle, in pixels; ``color`` is RGBA as a display shows it."""
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
+    batch = batch_for_shader(shader, "TRIS", {"pos": corners}, indices=[(0, 1, 2), (0, 2, 3)])
+    shader.uniform_float("color", color)
+    gpu.state.blend_set("ALPHA")
+    batch.draw(shader)
+    gpu.state.blend_set("NONE")
+
+
+def _heat_legend(left: float, bottom: float, scale: float) -> None:
+    width, height = 220 * scale, 10 * scale
+    steps = 64
+    for step in range(steps):
+        place = step / (steps - 1) * (len(HEAT) - 1)
+        index = min(int(place), len(HEAT) - 2)
+        blend = place - index
+        color = [a + (b - a) * blend for a, b in zip(HEAT[index], HEAT[index + 1])]
+        rectangle(left + width * step / steps, bottom, left + width * (step + 1) / steps, bottom + height, (*color, 1))
+    write("estimated error of a cell", left, bottom + 1.6 * height, scale)
+    write("0 %", left, bottom - 1.5 * height, scale)
+    write(f"{HEAT_END_PERCENT} % and more", left + 0.75 * width, bottom - 1.5 * height, scale)
+
+
+def _state_legend(left: float, bottom: float, line: float, scale: float) -> None:
+    for row, (color, meaning) in enumerate(reversed(_STATES)):
+        y = bottom + row * line
+        rectangle(left, y, left + 10 * scale, y + 10 * scale, (*color, 1))
+        write(meaning, left + 18 * scale, y, scale)
+
+
+def _corner(context: bpy.types.Context) -> tuple[float, float]:
+    """Left bottom of what no other region covers, with a margin."""
+    scale = context.preferences.system.ui_scale
+    covered = 0
+    if context.preferences.system.use_region_overlap:
+        for region in context.area.regions:
+            if region.type == "TOOLS" and region.alignment == "LEFT" and region.width > 1:
+                covered = region.width
+    return covered + _MARGIN * scale, _MARGIN * scale

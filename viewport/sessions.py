@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scenes as views show them: read once, kept on the GPU, and brought up to date from a timer.
+
+Draw callbacks must not evaluate anything, so they only ask for a session and draw what it has; reading and relighting
+happen in ``tick``. A session lives as long as some view of its scene shows Gridlight's light.
+"""
+
+from __future__ import annotations
+
+import time
+
+import bpy
+
+from ..core.errors import GridlightError
+from ..core.snapshot import SceneSnapshot
+from ..scene.notices import Notices
+from ..scene.read import read_lights, read_scene
+from ..scene.world import read_world
+from .changes import FIELDS, LIGHTS, SURFACES, WORLD
+from .gpu_scene import GpuScene
+from .live import Readout
+
+_PATIENCE = 3.0  # times the duration of a read: how long a scene must stand still before it is read again
+_QUICK_SECONDS = 0.03  # a read this short may happen in every frame
+
+
+class SceneSession:
+    """One scene on the GPU. ``version`` counts up whenever pictures of it would look different."""
+
+    def __init__(self, scene: bpy.types.Scene):
+        self._uid = scene.session_uid
+        self.version = 0
+        self.updates = 0  # of the depsgraph: visibility may have changed
+        self.message = ""  # why there is nothing to see
+        self.readout = Readout()
+        self.gpu: GpuScene | None = None  # None before the first read, and for scenes without surface
+        self.snapshot: SceneSnapshot | None = None
+        self._pending = {SURFACES}
+        self._changed_at = 0.0
+        self._read_seconds = 0.0
+
+    @property
+    def scene(self) -> bpy.types.Scene | None:
+        """The scene, None once it is deleted."""
+        return next((scene for scene in bpy.data.scenes if scene.session_uid == self._uid), None)
+
+    def mark(self, kinds: set[str]) -> None:
+        """Something changed; ``update`` will see to it."""
+        self.updates += 1
+        if kinds:
+            self._pending |= kinds
+            self._changed_at = time.perf_counter()
+            if kinds - {FIELDS}:
+                self.readout.changed()
+
+    @property
+    def is_pending(self) -> bool:
+        return bool(self._pending)
+
+    def update(self, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
+        """Reads what changed, unless the scene is still moving and reading it would stop the movement."""
+        if not self._pending:
+            return
+        still = time.perf_counter() - self._changed_at
+        slow = SURFACES in self._pending and self._read_seconds > _QUICK_SECONDS
+        if slow and self.gpu is not None and still < _PATIENCE * self._read_seconds:
+            return
+        kinds, self._pending = self._pending, set()
+        try:
+            if SURFACES in kinds or self.gpu is None:
+                self._read_everything(scene, view_layer)
+            else:
+                if LIGHTS in kinds:
+                    self.gpu.set_lights(read_lights(scene, view_layer))
+                if WORLD in kinds:
+                    self.gpu.set_world(read_world(scene, Notices()))
+                if FIELDS in kinds:
+                    self.gpu.load_fields(scene)
+            self.message = "" if self.gpu else "no surface to show: add a mesh"
+        except (GridlightError, RuntimeError) as error:  # unreadable field or scene, or Blender is rendering
+            self.message = str(error)
+        self.version += 1
+
+    def _read_everything(self, scene, view_layer) -> None:
+        started = time.perf_counter()
+        self.gpu = None
+        self.snapshot = read_scene(scene, view_layer, live=True)
+        if len(self.snapshot.triangles):
+            self.gpu = GpuScene(scene, self.snapshot)
+        self._read_seconds = time.perf_counter() - started
+
+
+_sessions: dict[int, SceneSession] = {}
+
+
+def session_of(scene: bpy.types.Scene) -> SceneSession:
+    """The session of ``scene``, new where there is none."""
+    if scene.session_uid not in _sessions:
+        _sessions[scene.session_uid] = SceneSession(scene)
+    return _sessions[scene.session_uid]
+
+
+def existing() -> list[SceneSession]:
+    return list(_sessions.values())
+
+
+def mark_all(kind: str) -> None:
+    for session in _sessions.values():
+        session.mark({kind})
+
+
+def drop(session: SceneSession) -> None:
+    """Frees what the session has on the GPU."""
+    _sessions.pop(session._uid, None)
+
+
+def drop_all() -> None:
+    _sessions.clear()
