@@ -13,3 +13,11 @@ def probe_reach_comp(info, defines):
     _ints(info, "first_slot", "box_count", "old_count")
     info.local_group_size(int(defines["GROUP"]), 1, 1)
     return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", "box_clip_lib", "probe_reach_comp"]}
+
+
+def scatter_comp(info, defines):
+    _samplers(info, "places", "values")
+    _image(info, 0, "target")
+    _ints(info, "value_count")
+    info.local_group_size(64, 1, 1)
+    return {"compute": ["data_lib", "scatter_comp"]}
