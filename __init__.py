@@ -3,16 +3,18 @@
 
 
 def register():
-    from . import cli, operators, panels
+    from . import cli, operators, panels, viewport
 
     operators.register()
+    viewport.register()
     panels.register()
     cli.register()
 
 
 def unregister():
-    from . import cli, operators, panels
+    from . import cli, operators, panels, viewport
 
     cli.unregister()
     panels.unregister()
+    viewport.unregister()
     operators.unregister()

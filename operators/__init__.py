@@ -4,23 +4,28 @@
 _unregister = []
 
 
-def _classes() -> tuple:
-    """Every operator, in the order of registration. Imported here, because the package must load without Blender."""
-    from . import place_probes
+def _modules() -> tuple:
+    """Modules with operators, in the order of registration. Imported here: the package must load without Blender."""
+    from . import bake, export, gallery, place_probes, report, stale, volume
 
-    return place_probes.classes
+    return volume, place_probes, bake, stale, gallery, export, report
 
 
 def register():
     import bpy
 
-    from . import properties
+    from . import bake, properties, stale
 
-    enter, leave = bpy.utils.register_classes_factory((*properties.classes, *_classes()))
+    modules = _modules()
+    classes = [item for module in modules for item in module.classes]
+    enter, leave = bpy.utils.register_classes_factory((*properties.classes, *classes))
     enter()
     _unregister.append(leave)
     properties.attach()
     _unregister.append(properties.detach)
+    stale.attach()
+    _unregister.append(stale.detach)
+    _unregister.append(lambda: bake.stop_running("The bake was given up, because Gridlight was switched off"))
 
 
 def unregister():

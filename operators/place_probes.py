@@ -5,32 +5,33 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from bpy.props import BoolProperty
 
 from ..core.conventions import ACTIVE, CULLED
 from ..core.culling import needed_nodes
 from ..core.errors import GridlightError, InputError
-from ..core.grid import Grid
-from ..core.snapshot import Volume
 from ..scene import probe_objects
 from ..scene.read import read_scene
-from ..scene.volumes import find_volumes
+from . import names
+from .volume_choice import chosen_volumes, grid_of, in_object_mode, volumes_of
 
 
 class GRIDLIGHT_OT_place_probes(bpy.types.Operator):
-    """Place an Empty at every probe that lights some surface: of the active volume, or of all volumes"""
+    """Place an Empty at every probe that lights some surface: of the active volume, or of all volumes. Delete one to
+    switch its probe off, move one to capture from another place within its cell"""
 
-    bl_idname = "gridlight.place_probes"
+    bl_idname = names.PLACE_PROBES
     bl_label = "Place Probes"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context):
-        return context.mode == "OBJECT"
+        return in_object_mode(cls, context)
 
     def execute(self, context):
         scene = context.scene
         try:
-            chosen = _chosen_volumes(scene, context.view_layer.objects.active)
+            chosen = chosen_volumes(context)
             snapshot = read_scene(scene, context.view_layer)
             if not len(snapshot.triangles):
                 raise InputError(f"scene '{scene.name}' has no surface to light; add a mesh first")
@@ -38,27 +39,26 @@ class GRIDLIGHT_OT_place_probes(bpy.types.Operator):
         except GridlightError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        # Volumes that were deleted or renamed since must not leave their probes behind.
-        for gone in probe_objects.placed_volumes(scene) - {volume.name for volume in find_volumes(scene)}:
-            probe_objects.clear_probes(scene, gone)
-        state = np.concatenate(states)
-        active = int((state == ACTIVE).sum())
-        self.report(
-            {"INFO"}, f"{active} of {len(state)} probes placed; {len(state) - active} light nothing and are culled"
-        )
+        probe_objects.forget_lost_volumes(scene)
+        active = int(sum((state == ACTIVE).sum() for state in states))
+        total = sum(len(state) for state in states)
+        text = f"{active} of {total} probes placed; {total - active} light nothing and are culled"
+        if any((state == ACTIVE).sum() > probe_objects.OBJECT_LIMIT for state in states):
+            text += f". More than {probe_objects.OBJECT_LIMIT} in a volume are shown as points, not as objects"
+        self.report({"INFO"}, text)
         return {"FINISHED"}
 
 
 class GRIDLIGHT_OT_clear_probes(bpy.types.Operator):
-    """Remove all probe Empties from the scene; volumes and baked light stay"""
+    """Remove all probe Empties from the scene and forget what was done to them; volumes and baked light stay"""
 
-    bl_idname = "gridlight.clear_probes"
+    bl_idname = names.CLEAR_PROBES
     bl_label = "Clear Probes"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context):
-        return context.mode == "OBJECT"
+        return in_object_mode(cls, context)
 
     def execute(self, context):
         count = probe_objects.clear_probes(context.scene)
@@ -66,24 +66,40 @@ class GRIDLIGHT_OT_clear_probes(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _chosen_volumes(scene: bpy.types.Scene, active: bpy.types.Object | None) -> list[Volume]:
-    """The active object's volume, otherwise all of the scene.
+class GRIDLIGHT_OT_reset_probes(bpy.types.Operator):
+    """Bring probes back to where their grid has them; deleted ones too, unless only selected probes are reset"""
 
-    Raises:
-        InputError: there is none.
-    """
-    volumes = find_volumes(scene)
-    if not volumes:
-        raise InputError("the scene has no probe volume; add one with Add › Light Probe › Gridlight Volume")
-    return [volume for volume in volumes if active is not None and volume.name == active.name] or volumes
+    bl_idname = names.RESET_PROBES
+    bl_label = "Reset Probes"
+    bl_options = {"REGISTER", "UNDO"}
+
+    selected: BoolProperty(
+        name="Selected Only", description="Only probes that are selected, which leaves deleted ones deleted"
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return in_object_mode(cls, context)
+
+    def execute(self, context):
+        scene = context.scene
+        count = 0
+        for volume in volumes_of(scene):
+            edits = probe_objects.read_edits(scene, volume)
+            if edits is None:
+                continue
+            count += probe_objects.reset(scene, volume, only=set(context.selected_objects) if self.selected else None)
+        self.report({"INFO"}, f"{count} probes are back in their places")
+        return {"FINISHED"}
 
 
-def _place(scene: bpy.types.Scene, volume: Volume, triangles: np.ndarray) -> np.ndarray:
-    """Culls and places one volume; returns its states (P,)."""
-    grid = Grid(volume.matrix, volume.resolution, volume.name)
+def _place(scene: bpy.types.Scene, volume: bpy.types.Object, triangles: np.ndarray) -> np.ndarray:
+    """Culls and places one volume, keeping what the user did to its probes; returns its states (P,)."""
+    grid = grid_of(volume)
+    edits = probe_objects.read_edits(scene, volume)
     state = np.where(needed_nodes(grid, triangles), ACTIVE, CULLED).astype(np.uint8)
-    probe_objects.place_probes(scene, grid, state, scene.objects[volume.name])
+    probe_objects.place_probes(scene, grid, state, volume, edits)
     return state
 
 
-classes = (GRIDLIGHT_OT_place_probes, GRIDLIGHT_OT_clear_probes)
+classes = (GRIDLIGHT_OT_place_probes, GRIDLIGHT_OT_clear_probes, GRIDLIGHT_OT_reset_probes)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Marks tests that run inside the real Blender with a window.
 
-A test is a generator that plays a person in front of Blender: it acts, yields the seconds that the person waits (Blender
+A test is a generator that plays a person in front of Blender: it acts, yields the seconds that it waits (Blender
 goes on in that time), looks, and asserts. The file is imported twice: by pytest, where the mark turns it into a test
 that sends its name to a running Blender, and by that Blender, which runs it. So modules here import nothing but the
 standard library, numpy, bpy and this one at their top; what belongs to the extension is imported inside the tests.

@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bake volumes: at once from scripts, as a modal job that leaves Blender usable from the interface."""
+
+from __future__ import annotations
+
+import time
+
+import bpy
+from bpy.app.handlers import persistent
+from bpy.props import BoolProperty
+
+from .. import viewport
+from ..core.errors import Cancelled, GridlightError
+from ..scene.field_storage import remove_field, stored_text
+from . import names
+from .bake_task import BakeTask
+from .sidebar import redraw_sidebars
+from .volume_choice import chosen_volumes, in_object_mode, volumes_of
+
+_INTERVAL_SECONDS = 0.01  # between two timer events
+_BUDGET_SECONDS = 0.03  # of work in one; a single step may take longer
+_REDRAW_SECONDS = 0.1
+
+_running: _Job | None = None
+_last_outcome = ""
+
+
+class _Job:
+    """A task and everything in Blender that must be put back when it ends."""
+
+    def __init__(self, task: BakeTask, context: bpy.types.Context):
+        self.task = task
+        self._manager = context.window_manager
+        self._workspaces = [window.workspace for window in self._manager.windows]
+        self._timer = self._manager.event_timer_add(_INTERVAL_SECONDS, window=context.window)
+        self._drawn = 0.0
+        self._manager.progress_begin(0, 100)
+        for handlers in _interruptions():
+            handlers.append(_interrupted)
+
+    def show(self) -> None:
+        """Brings progress to cursor, status bar and panels, now and then."""
+        now = time.monotonic()
+        if now - self._drawn < _REDRAW_SECONDS:
+            return
+        self._drawn = now
+        progress = self.task.progress
+        self._manager.progress_update(int(100 * progress.share))
+        for workspace in self._workspaces:
+            workspace.status_text_set(f"Gridlight: {progress}   |   Esc: cancel")
+        redraw_sidebars()
+
+    def end(self, outcome: str) -> None:
+        """Puts everything back; more than once does no harm."""
+        global _running, _last_outcome
+        if _running is not self:
+            return
+        _running, _last_outcome = None, outcome
+        self._manager.event_timer_remove(self._timer)
+        self._manager.progress_end()
+        for workspace in self._workspaces:
+            workspace.status_text_set(None)
+        for handlers in _interruptions():
+            handlers.remove(_interrupted)
+        redraw_sidebars()
+
+
+class GRIDLIGHT_OT_bake(bpy.types.Operator):
+    """Bake the light of the active volume, or of all volumes. Blender stays usable; Esc cancels and leaves everything
+    as it was"""
+
+    bl_idname = names.BAKE
+    bl_label = "Bake"
+    bl_options = {"UNDO"}
+
+    everything: BoolProperty(name="All Volumes", description="Bake every volume, not only the active one")
+
+    @classmethod
+    def poll(cls, context):
+        if not in_object_mode(cls, context):
+            return False
+        if _running is not None:
+            cls.poll_message_set("A bake is running; wait, or cancel it")
+            return False
+        if not volumes_of(context.scene):
+            cls.poll_message_set("Add a probe volume first: Add › Light Probe › Gridlight Volume")
+            return False
+        return True
+
+    def execute(self, context):
+        """Bakes to the end before it returns."""
+        global _last_outcome
+        try:
+            task = BakeTask(context.scene, context.view_layer, chosen_volumes(context, self.everything))
+            for _ in task:
+                pass
+        except GridlightError as error:
+            return self._failed(error)
+        _last_outcome = task.outcome
+        return self._finished(context, task)
+
+    def invoke(self, context, _event):
+        global _running
+        try:
+            task = BakeTask(context.scene, context.view_layer, chosen_volumes(context, self.everything))
+        except GridlightError as error:
+            return self._failed(error)
+        self._job = _running = _Job(task, context)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        job = self._job
+        if _running is not job:  # ended from outside: another file, the extension switched off
+            return {"CANCELLED"}
+        if event.type == "ESC" and event.value == "PRESS":
+            job.task.stop("The bake was cancelled; everything is as it was")
+        elif event.type != "TIMER" and not job.task.stopped:
+            return {"PASS_THROUGH"}
+        if context.mode != "OBJECT":
+            job.task.stop("The bake was given up, because the mode was changed")
+        job.task.check()
+        deadline = time.perf_counter() + _BUDGET_SECONDS
+        try:
+            while time.perf_counter() < deadline:
+                next(job.task)
+        except StopIteration:
+            job.end(job.task.outcome)
+            return self._finished(context, job.task)
+        except GridlightError as error:
+            job.end(str(error))
+            return self._failed(error)
+        except Exception:  # a bug: it must not leave timer and status text behind, and goes on to Blender's console
+            job.end("The bake failed; the console says more")
+            raise
+        job.show()
+        return {"RUNNING_MODAL"} if event.type == "ESC" else {"PASS_THROUGH"}
+
+    def cancel(self, _context):
+        """Blender ends the operator itself: its window was closed."""
+        self._job.task.stop("The bake was given up, because its window was closed")
+        self._job.end("The bake was given up, because its window was closed")
+
+    def _finished(self, context, task: BakeTask) -> set[str]:
+        for warning in task.progress.warnings:
+            self.report({"WARNING"}, warning)
+        self.report({"INFO"}, task.outcome)
+        for volume in volumes_of(context.scene):
+            viewport.field_changed(volume)
+        return {"FINISHED"}
+
+    def _failed(self, error: GridlightError) -> set[str]:
+        self.report({"INFO"} if isinstance(error, Cancelled) else {"ERROR"}, str(error))
+        return {"CANCELLED"}
+
+
+class GRIDLIGHT_OT_cancel_bake(bpy.types.Operator):
+    """Stop the running bake and leave everything as it was"""
+
+    bl_idname = names.CANCEL_BAKE
+    bl_label = "Cancel"
+    bl_options = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, _context):
+        if _running is None:
+            cls.poll_message_set("No bake is running")
+        return _running is not None
+
+    def execute(self, _context):
+        _running.task.stop("The bake was cancelled; everything is as it was")
+        return {"FINISHED"}
+
+
+class GRIDLIGHT_OT_clear_bake(bpy.types.Operator):
+    """Forget the light of the active volume, or of all volumes, that is stored in this file"""
+
+    bl_idname = names.CLEAR_BAKE
+    bl_label = "Clear Bake"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if not in_object_mode(cls, context):
+            return False
+        if not any(stored_text(volume) for volume in volumes_of(context.scene)):
+            cls.poll_message_set("Nothing is baked")
+            return False
+        return True
+
+    def execute(self, context):
+        for volume in chosen_volumes(context):
+            remove_field(volume)
+            viewport.field_changed(volume)
+        return {"FINISHED"}
+
+
+def running_task() -> BakeTask | None:
+    """The bake that runs now."""
+    return _running.task if _running is not None else None
+
+
+def last_outcome() -> str:
+    """In one line how the last bake of this session ended; empty before the first."""
+    return _last_outcome
+
+
+def stop_running(reason: str) -> None:
+    """Ends a running bake at once, if there is one."""
+    if _running is not None:
+        _running.task.stop(reason)
+        _running.end(reason)
+
+
+@persistent  # loading a file removes other handlers before they could tell
+def _interrupted(*_arguments) -> None:
+    stop_running("The bake was given up, because the file changed under it")
+
+
+def _interruptions() -> tuple[list, ...]:
+    handlers = bpy.app.handlers
+    return handlers.load_pre, handlers.undo_pre, handlers.redo_pre
+
+
+classes = (GRIDLIGHT_OT_bake, GRIDLIGHT_OT_cancel_bake, GRIDLIGHT_OT_clear_bake)

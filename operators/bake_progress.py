@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far a bake is, for a progress bar: receives what ``bake.job`` reports."""
+
+from __future__ import annotations
+
+import time
+
+from ..core.settings import BakeSettings
+
+# Phases in order, with the share of a volume's bake that each takes about.
+_SHARES = {"read": 0.05, "cull": 0.05, "upload": 0.1, "capture": 0.3, "light": 0.3, "gather": 0.2}
+_TITLES = {
+    "read": "Reading the scene",
+    "cull": "Culling probes",
+    "upload": "Sending the scene to the GPU",
+    "capture": "Capturing",
+    "light": "Bouncing light",
+    "gather": "Gathering",
+}
+_TYPICAL_ITERATIONS = 8  # until light has settled; only the bar's speed hangs on it
+_LEAST_SECONDS, _LEAST_SHARE = 1.0, 0.05  # before a guess of the time left is worth reading
+
+
+class Progress:
+    """A ``bake.job.Reporter`` that keeps figures instead of printing them."""
+
+    def __init__(self, volumes: int, settings: BakeSettings):
+        self.warnings: list[str] = []
+        self.notes: list[str] = []
+        self.name = ""
+        self._volumes = volumes
+        self._volume = 0
+        self._gathers = settings.gather > 0
+        self._iterations = None if settings.bounces is None else settings.bounces + 1
+        self._phase = "read"
+        self._done, self._total = 0, None
+        self._started = time.monotonic()
+
+    def volume(self, name: str) -> None:
+        """The next volume begins."""
+        self.name = name
+        self._volume += 1
+
+    def phase(self, name: str, total: int | None = None) -> None:
+        self._phase, self._done = name, 0
+        self._total = self._iterations if name == "light" and total is None else total
+
+    def advance(self, amount: int = 1) -> None:
+        self._done += amount
+
+    def note(self, text: str) -> None:
+        self.notes.append(text)
+
+    def warn(self, text: str) -> None:
+        if text not in self.warnings:
+            self.warnings.append(text)
+
+    @property
+    def share(self) -> float:
+        """0 … 1 of the whole work, as far as it can be known."""
+        shares = {name: share for name, share in _SHARES.items() if self._gathers or name != "gather"}
+        names = list(shares)
+        before = sum(shares[name] for name in names[: names.index(self._phase)]) if self._phase in shares else 0.0
+        if self._total:
+            within = min(self._done / self._total, 1.0)
+        else:  # how many there will be is not known: the bar slows down
+            within = 1.0 - 0.5 ** (2.0 * self._done / _TYPICAL_ITERATIONS)
+        in_volume = (before + shares.get(self._phase, 0.0) * within) / sum(shares.values())
+        return (max(self._volume - 1, 0) + in_volume) / self._volumes
+
+    @property
+    def seconds_left(self) -> float | None:
+        """A guess; None while there is too little to guess from."""
+        elapsed = time.monotonic() - self._started
+        if elapsed < _LEAST_SECONDS or self.share < _LEAST_SHARE:
+            return None
+        return elapsed * (1.0 - self.share) / self.share
+
+    def __str__(self) -> str:
+        text = _TITLES.get(self._phase, self._phase.capitalize())
+        if self._total:
+            text += f" {min(self._done, self._total)}/{self._total}"
+        elif self._done:
+            text += f" {self._done}"
+        left = self.seconds_left
+        if left is not None:
+            text += f", about {left:.0f} s left" if left < 90 else f", about {left / 60:.0f} min left"
+        return text

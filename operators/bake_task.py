@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A bake of one or more volumes in steps: what ``Bake`` drives to the end at once, or with a timer bit by bit.
+
+Until the last step nothing in the file changes, so giving up at any time leaves everything as it was. Blender's data
+may change between two steps: the task keeps arrays of its own and knows volumes by their session's identifier only.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import bpy
+
+from ..bake.job import BakeResult, bake_steps
+from ..core.errors import Cancelled, InputError
+from ..core.settings import BakeSettings
+from ..core.snapshot import SceneSnapshot
+from ..formats import probe_file
+from ..formats.probe_metadata import provenance, scene_hash
+from ..gpu_shaders.context import device_description, ensure_context
+from ..scene.field_storage import store_field
+from ..scene.probe_objects import read_edits
+from ..scene.read import read_scene
+from .bake_progress import Progress
+from .volume_choice import grid_of
+
+
+class BakeTask:
+    """Call ``next(task)`` until it stops; ``outcome`` then says in one line what came of it.
+
+    ``next`` raises what goes wrong: a GridlightError, after which the task is over.
+    """
+
+    def __init__(self, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, volumes: list[bpy.types.Object]):
+        self.settings: BakeSettings = scene.gridlight.bake_settings()
+        self.progress = Progress(len(volumes), self.settings)
+        self.outcome = ""
+        self._scene = scene.session_uid
+        self._view_layer = view_layer.name
+        self._volumes = [volume.session_uid for volume in volumes]
+        self._stop_reason = ""
+        self._steps = self._run()
+
+    def __next__(self) -> None:
+        if self._stop_reason:
+            self._steps.close()  # lets go of the GPU's textures
+            raise Cancelled(self._stop_reason)
+        next(self._steps)
+
+    def __iter__(self) -> BakeTask:
+        return self
+
+    def stop(self, reason: str) -> None:
+        """Makes the next step the last. ``reason`` is a line for the user."""
+        self._stop_reason = self._stop_reason or reason
+
+    @property
+    def stopped(self) -> bool:
+        return bool(self._stop_reason)
+
+    def check(self) -> None:
+        """Stops the task if what it works for is gone."""
+        try:
+            self._find_volumes()
+        except InputError as error:
+            self.stop(f"The bake was given up: {error}")
+
+    def _run(self) -> Iterator[None]:
+        started = time.perf_counter()
+        self.progress.phase("read")
+        yield  # the first picture of the progress comes before the first work
+        ensure_context()
+        scene = _by_uid(bpy.data.scenes, self._scene)
+        if scene is None:
+            raise InputError("the scene is gone")
+        volumes = self._find_volumes()
+        grids = [grid_of(volume) for volume in volumes]
+        edits = [read_edits(scene, volume) for volume in volumes]
+        for grid in grids:
+            probe_file.check_size(grid, self.settings.bands)
+        view_layer = scene.view_layers.get(self._view_layer)
+        snapshot = read_scene(scene, view_layer)
+        shown = scene_hash(read_scene(scene, view_layer, live=True))
+        for warning in snapshot.warnings:
+            self.progress.warn(warning)
+        yield
+        results = []
+        for grid, edit in zip(grids, edits):
+            self.progress.volume(grid.name)
+            result = BakeResult()
+            yield from bake_steps(
+                snapshot, grid, self.settings, self.progress, result, **({"edits": edit} if edit else {})
+            )
+            results.append(result)
+        for volume, result in zip(self._find_volumes(), results):
+            self._store(volume, snapshot, result, shown)
+        self.outcome = _in_words(results, time.perf_counter() - started)
+
+    def _find_volumes(self) -> list[bpy.types.Object]:
+        """The volumes as they are now; undo and renaming may have moved them.
+
+        Raises:
+            InputError: one was deleted.
+        """
+        scene = _by_uid(bpy.data.scenes, self._scene)
+        volumes = [_by_uid(scene.objects, uid) for uid in self._volumes] if scene else [None]
+        if None in volumes:
+            raise InputError("its volume or scene was deleted")
+        return volumes
+
+    def _store(self, volume: bpy.types.Object, snapshot: SceneSnapshot, result: BakeResult, viewport_hash: str) -> None:
+        warnings = [*self.progress.warnings, *result.warnings]
+        metadata = provenance(
+            snapshot, self.settings, device_description(), result.iterations, result.converged, warnings
+        )
+        result.field.metadata = {**result.field.metadata, **metadata}
+        details = {
+            "viewport_hash": viewport_hash,
+            "seconds": result.seconds,
+            "energy": [float(value) for value in result.energy],
+            "change": [float(value) for value in result.change],
+            "notes": result.notes,
+            "quality": bpy.data.scenes[snapshot.name].gridlight.quality,
+        }
+        store_field(volume, result.field, metadata["scene_hash"], details)
+
+
+def _by_uid(items, uid: int):
+    return next((item for item in items if item.session_uid == uid), None)
+
+
+def _in_words(results: list[BakeResult], seconds: float) -> str:
+    active = sum(result.counts["active"] for result in results)
+    bounces = max(result.iterations for result in results) - 1
+    text = f"{active} probes baked in {seconds:.1f} s, light bounced {bounces} times"
+    if not all(result.converged for result in results):
+        text += ", some of it is still missing"
+    return text

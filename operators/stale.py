@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether baked light still belongs to its scene.
+
+The exact answer compares hashes, which means reading the whole scene. Edits only note that there was one; when they
+have come to rest, and reading is quick, the answer is looked up, otherwise it waits for ``Check``.
+"""
+
+from __future__ import annotations
+
+import time
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..formats.probe_metadata import scene_hash
+from ..scene.field_storage import has_moved, stored_details, stored_text
+from ..scene.read import read_scene
+from . import names
+from .bake import running_task
+from .sidebar import redraw_sidebars
+from .volume_choice import in_object_mode, volumes_of
+
+FRESH, STALE, EDITED = "FRESH", "STALE", "EDITED"
+
+_REST_SECONDS = 0.8  # after the last edit before the scene is read
+_QUICK_SECONDS = 0.25  # more than this is not read without being asked
+_LIGHTS_SCENE = (bpy.types.Object, bpy.types.Mesh, bpy.types.Light, bpy.types.Material, bpy.types.World)
+
+_hashes: dict[int, str] = {}  # of scenes as they are now, by session_uid
+_edited: set[int] = set()  # scenes that may have changed since
+_read_seconds: dict[int, float] = {}
+_last_edit = 0.0  # time.monotonic()
+_reading = False  # reading may update the depsgraph, which is no edit
+
+
+def state_of(scene: bpy.types.Scene, volume: bpy.types.Object) -> str:
+    """FRESH, STALE or EDITED (not compared since an edit) for a volume with light."""
+    if has_moved(volume):
+        return STALE
+    now = _hashes.get(scene.session_uid)
+    if scene.session_uid in _edited or now is None:
+        return EDITED
+    return FRESH if stored_details(volume).get("viewport_hash") == now else STALE
+
+
+def compare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
+    """Reads ``scene`` and remembers its hash."""
+    started = time.perf_counter()
+    global _reading
+    _reading = True
+    try:
+        snapshot = read_scene(scene, view_layer, live=True)
+    finally:
+        _reading = False
+    _hashes[scene.session_uid] = scene_hash(snapshot)
+    _edited.discard(scene.session_uid)
+    _read_seconds[scene.session_uid] = time.perf_counter() - started
+    redraw_sidebars()
+
+
+class GRIDLIGHT_OT_check_bake(bpy.types.Operator):
+    """Compare the scene with the one that was baked"""
+
+    bl_idname = names.CHECK_BAKE
+    bl_label = "Check"
+    bl_options = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, context):
+        return in_object_mode(cls, context)
+
+    def execute(self, context):
+        compare(context.scene, context.view_layer)
+        stale = [
+            volume.name
+            for volume in volumes_of(context.scene)
+            if stored_text(volume) and state_of(context.scene, volume) == STALE
+        ]
+        if stale:
+            self.report({"WARNING"}, f"The light of {', '.join(stale)} belongs to another state of the scene")
+        else:
+            self.report({"INFO"}, "The baked light belongs to this scene")
+        return {"FINISHED"}
+
+
+@persistent
+def _scene_edited(scene, depsgraph) -> None:
+    global _last_edit
+    if _reading or not any(isinstance(update.id, _LIGHTS_SCENE) for update in depsgraph.updates):
+        return
+    if scene.session_uid in _edited:
+        _last_edit = time.monotonic()
+    else:
+        _note_edit(scene)
+
+
+@persistent
+def _file_loaded(*_arguments) -> None:
+    """Another file, or an earlier state of this one: nothing is known any more."""
+    forget()
+    for window in bpy.context.window_manager.windows:
+        _note_edit(window.scene)
+
+
+def _note_edit(scene: bpy.types.Scene) -> None:
+    """The scene may differ from what was baked in it, if anything was."""
+    global _last_edit
+    if any(stored_text(volume) for volume in volumes_of(scene)):
+        _edited.add(scene.session_uid)
+        _last_edit = time.monotonic()
+        if not bpy.app.timers.is_registered(_look_when_at_rest):
+            bpy.app.timers.register(_look_when_at_rest, first_interval=_REST_SECONDS)
+
+
+def _look_when_at_rest() -> float | None:
+    """The timer: compares what was edited once edits have come to rest."""
+    waited = time.monotonic() - _last_edit
+    if waited < _REST_SECONDS:
+        return _REST_SECONDS - waited
+    for window in bpy.context.window_manager.windows:
+        scene, screen = window.scene, window.screen
+        if scene.session_uid not in _edited or running_task() is not None or screen.is_animation_playing:
+            continue
+        if _read_seconds.get(scene.session_uid, 0.0) <= _QUICK_SECONDS:
+            compare(scene, window.view_layer)
+    return None
+
+
+def forget() -> None:
+    """Drops what is known about scenes."""
+    _hashes.clear()
+    _edited.clear()
+    _read_seconds.clear()
+
+
+def attach() -> None:
+    handlers = bpy.app.handlers
+    handlers.depsgraph_update_post.append(_scene_edited)
+    for after in (handlers.load_post, handlers.undo_post, handlers.redo_post):
+        after.append(_file_loaded)
+
+
+def detach() -> None:
+    handlers = bpy.app.handlers
+    handlers.depsgraph_update_post.remove(_scene_edited)
+    for after in (handlers.load_post, handlers.undo_post, handlers.redo_post):
+        after.remove(_file_loaded)
+    if bpy.app.timers.is_registered(_look_when_at_rest):
+        bpy.app.timers.unregister(_look_when_at_rest)
+    forget()
+
+
+classes = (GRIDLIGHT_OT_check_bake,)

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which volumes an operator or a panel is about, and the grid that each stands for."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..core.errors import InputError
+from ..core.grid import Grid
+from ..scene.volumes import box_of, is_volume, resolution_of
+
+
+def volumes_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The scene's volumes, by name."""
+    return sorted((item for item in scene.objects if is_volume(item)), key=lambda item: item.name)
+
+
+def active_volume(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The active object if it is a volume, the volume of an active probe, or the scene's only volume."""
+    item = context.view_layer.objects.active
+    for candidate in (item, item.parent if item else None):
+        if is_volume(candidate):
+            return candidate
+    volumes = volumes_of(context.scene)
+    return volumes[0] if len(volumes) == 1 else None
+
+
+def chosen_volumes(context: bpy.types.Context, everything: bool = False) -> list[bpy.types.Object]:
+    """The active volume, or all where none is active or ``everything`` is asked for.
+
+    Raises:
+        InputError: the scene has none.
+    """
+    volumes = volumes_of(context.scene)
+    if not volumes:
+        raise InputError("the scene has no probe volume; add one with Add › Light Probe › Gridlight Volume")
+    active = None if everything else active_volume(context)
+    return volumes if active is None else [active]
+
+
+def grid_of(volume: bpy.types.Object) -> Grid:
+    """The volume's grid where it stands now.
+
+    Raises:
+        InputError: its box or its counts cannot be a grid.
+    """
+    return Grid(box_of(volume), resolution_of(volume), volume.name)
+
+
+def in_object_mode(operator, context: bpy.types.Context) -> bool:
+    """For ``poll``: object mode, or a line that says so."""
+    if context.mode == "OBJECT":
+        return True
+    operator.poll_message_set("Switch to Object Mode first")
+    return False

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bake: quality, the button, how far it is, and what came of it."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..operators import names
+from ..operators.bake import last_outcome, running_task
+from ..operators.quality import QUALITIES
+from ..operators.stale import EDITED, STALE, state_of
+from ..operators.volume_choice import active_volume, volumes_of
+from ..scene.field_storage import has_moved, stored_metadata
+from .sidebar_panel import SidebarPanel, paragraph
+
+
+class GRIDLIGHT_PT_bake(SidebarPanel, bpy.types.Panel):
+    bl_label = "Bake"
+    bl_order = 1
+
+    def draw(self, context):
+        layout = self.layout
+        settings = context.scene.gridlight
+        layout.row(align=True).prop(settings, "quality", expand=True)
+        quality = QUALITIES.get(settings.quality)
+        row = layout.row()
+        row.active = False
+        row.label(
+            text=f"{quality.error_percent:.1f} % from path tracing in the gallery"
+            if quality
+            else "Error not measured in advance"
+        )
+        task = running_task()
+        if task is not None:
+            _running(layout, task)
+            return
+        column = layout.column(align=True)
+        column.scale_y = 1.5
+        row = column.row(align=True)
+        row.operator(names.BAKE, icon="RENDER_STILL")
+        if len(volumes_of(context.scene)) > 1:
+            row.operator(names.BAKE, text="Bake All").everything = True
+        _state(layout, context)
+
+
+class GRIDLIGHT_PT_bake_settings(SidebarPanel, bpy.types.Panel):
+    bl_label = "Settings"
+    bl_parent_id = "GRIDLIGHT_PT_bake"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.enabled = running_task() is None
+        settings = context.scene.gridlight
+        column = layout.column()
+        column.prop(settings, "bands")
+        column.prop(settings, "face")
+        column.prop(settings, "samples")
+        column.prop(settings, "gather")
+        column = layout.column()
+        column.prop(settings, "bounces_auto")
+        if settings.bounces_auto:
+            column.prop(settings, "tolerance")
+        else:
+            column.prop(settings, "bounces")
+        column = layout.column()
+        column.prop(settings, "capture")
+        column.prop(settings, "seed")
+        column.prop(settings, "memory_mib")
+        column.prop(settings, "keep_all")
+
+
+def _running(layout, task) -> None:
+    progress = task.progress
+    if progress.name:
+        layout.label(text=progress.name, icon="LIGHTPROBE_VOLUME")
+    layout.progress(factor=progress.share, text=str(progress))
+    row = layout.row()
+    row.scale_y = 1.5
+    row.operator(names.CANCEL_BAKE, icon="CANCEL")
+
+
+def _state(layout, context) -> None:
+    """Whether there is light, and whether it still belongs to the scene."""
+    volume = active_volume(context)
+    metadata = stored_metadata(volume) if volume else None
+    if metadata is None:
+        if last_outcome():
+            paragraph(layout, context, last_outcome(), "INFO")
+        return
+    state = state_of(context.scene, volume)
+    if has_moved(volume):
+        paragraph(layout, context, "The volume has changed since its light was baked. Bake again", "ERROR")
+    elif state == STALE:
+        paragraph(layout, context, "The scene has changed since this light was baked. Bake again", "ERROR")
+    elif state == EDITED:
+        row = layout.row()
+        row.label(text="Edited since the bake", icon="QUESTION")
+        row.operator(names.CHECK_BAKE)
+    else:
+        layout.label(text="The light is up to date", icon="CHECKMARK")
+    if last_outcome():
+        paragraph(layout, context, last_outcome(), "BLANK1")
+    layout.operator(names.CLEAR_BAKE, icon="TRASH")
+
+
+classes = (GRIDLIGHT_PT_bake, GRIDLIGHT_PT_bake_settings)

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Volumes: where probes are, and how many."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ..operators import names
+from ..operators.volume_choice import active_volume, volumes_of
+from ..scene import probe_objects
+from ..scene.field_storage import has_moved, stored_counts
+from ..scene.volumes import resolution_of
+from .sidebar_panel import SidebarPanel, paragraph
+
+
+class GRIDLIGHT_PT_volume(SidebarPanel, bpy.types.Panel):
+    bl_label = "Volume"
+    bl_order = 0
+
+    def draw(self, context):
+        layout = self.layout
+        volumes = volumes_of(context.scene)
+        if not volumes:
+            paragraph(layout, context, "A volume says where light probes stand. Add one, or look at the gallery.")
+            column = layout.column()
+            column.scale_y = 1.3
+            column.operator(names.ADD_VOLUME, text="Add Volume", icon="LIGHTPROBE_VOLUME")
+            column.operator(names.ADD_GALLERY, text="Add Gallery", icon="HOME")
+            return
+        active = active_volume(context)
+        if len(volumes) > 1:
+            _list(layout, volumes, active)
+        else:
+            layout.label(text=active.name, icon="LIGHTPROBE_VOLUME")
+        if active is None:
+            paragraph(layout, context, "Select a volume to see and change it", "INFO")
+        else:
+            _grid(layout, context, active)
+        layout.operator(names.ADD_VOLUME, text="Add Volume", icon="ADD")
+
+
+class GRIDLIGHT_PT_probes(SidebarPanel, bpy.types.Panel):
+    bl_label = "Probes"
+    bl_parent_id = "GRIDLIGHT_PT_volume"
+    bl_order = 1
+
+    @classmethod
+    def poll(cls, context):
+        return bool(volumes_of(context.scene))
+
+    def draw(self, context):
+        layout = self.layout
+        volume = active_volume(context)
+        if volume is not None:
+            _counts(layout, volume)
+            _placed(layout, context, volume)
+        row = layout.row(align=True)
+        row.operator(names.PLACE_PROBES, text="Place", icon="EMPTY_AXIS")
+        row.operator(names.RESET_PROBES, text="Reset", icon="LOOP_BACK")
+        row.operator(names.CLEAR_PROBES, text="Clear", icon="X")
+
+
+def _list(layout, volumes, active) -> None:
+    column = layout.column(align=True)
+    for volume in volumes:
+        counts = " × ".join(map(str, resolution_of(volume)))
+        chosen = volume == active
+        button = column.operator(
+            names.SELECT_VOLUME, text=f"{volume.name}   {counts}", icon="LIGHTPROBE_VOLUME", depress=chosen
+        )
+        button.volume = volume.name
+
+
+def _grid(layout, context, volume) -> None:
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    column = layout.column()
+    column.prop(volume.gridlight_grid, "resolution")
+    column.prop(volume.gridlight_grid, "spacing")
+    layout.use_property_split = False
+    row = layout.row(align=True)
+    row.label(text="Fit to")
+    row.operator_enum(names.FIT_VOLUME, "fit")
+
+
+def _counts(layout, volume) -> None:
+    total = int(np.prod(resolution_of(volume)))
+    counts = stored_counts(volume)
+    grid = layout.grid_flow(row_major=True, columns=4, even_columns=True, align=True)
+    if counts is None or has_moved(volume):
+        known = {"total": f"{total}", "active": "–", "culled": "–", "invalid": "–"}
+    else:
+        known = {name: f"{count}" for name, count in counts.items()}
+    for name in known:
+        cell = grid.column(align=True)
+        cell.alignment = "CENTER"
+        cell.label(text=known[name])
+        sub = cell.column()
+        sub.active = False
+        sub.label(text=name)
+
+
+def _placed(layout, context, volume) -> None:
+    scene = context.scene
+    placed = probe_objects.placed_count(scene, volume)
+    if placed is None:
+        return
+    if placed > probe_objects.OBJECT_LIMIT:
+        text = f"{placed} probes are shown as points: more than {probe_objects.OBJECT_LIMIT} objects would be slow"
+        paragraph(layout, context, text, "INFO")
+        return
+    edits = probe_objects.read_edits(scene, volume)
+    if edits is None:
+        layout.label(text=f"{placed} placed", icon="EMPTY_AXIS")
+        return
+    off, moved = int(edits.disabled.sum()), int(edits.offset.any(axis=1).sum())
+    layout.label(text=f"{placed} placed, {off} switched off, {moved} moved", icon="EMPTY_AXIS")
+
+
+classes = (GRIDLIGHT_PT_volume, GRIDLIGHT_PT_probes)

@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators and properties without a window: what a script sees."""
+
+import bpy
+import gridlight
+import numpy as np
+import pytest
+from gridlight.core.settings import BakeSettings
+from gridlight.scene import probe_objects
+from gridlight.scene.field_storage import load_field, stored_counts
+from gridlight.scene.volumes import create_volume
+
+
+@pytest.fixture
+def scene():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    gridlight.register()
+    yield bpy.context.scene
+    gridlight.unregister()
+
+
+@pytest.fixture
+def room(scene):
+    """A closed room with a lamp, and a volume of 3×3×3 in it."""
+    bpy.ops.mesh.primitive_cube_add(size=4.0)
+    bpy.ops.object.light_add(type="POINT", location=(0.5, 0.3, 1.0))
+    bpy.context.object.data.energy = 100.0
+    volume = create_volume(scene, "Room", np.diag([1.6, 1.6, 1.6, 1.0]), (3, 3, 3))
+    bpy.context.view_layer.update()
+    bpy.context.view_layer.objects.active = volume
+    return volume
+
+
+def test_settings_are_the_bakes_own_by_default(scene):
+    assert scene.gridlight.bake_settings() == BakeSettings()
+    assert scene.gridlight.quality == "GOOD"
+
+
+def test_presets_and_single_settings_agree(scene):
+    settings = scene.gridlight
+    settings.quality = "DRAFT"
+    assert settings.face == 8 and settings.quality == "DRAFT"
+    settings.face = 20
+    assert settings.quality == "CUSTOM"
+    settings.quality = "GOOD"
+    assert settings.face == 16
+    settings.quality = "CUSTOM"
+    assert settings.quality == "CUSTOM" and settings.face == 16
+
+
+def test_spacing_chooses_counts_and_remembers_what_was_typed(scene):
+    volume = create_volume(scene, "Box", np.diag([2.0, 1.0, 0.5, 1.0]), (2, 2, 2))
+    bpy.context.view_layer.update()
+    grid = volume.gridlight_grid
+    grid.spacing = 0.45
+    assert tuple(grid.resolution) == (10, 5, 3)
+    assert grid.spacing == pytest.approx(0.45)
+    grid.resolution = (5, 2, 2)
+    assert grid.spacing == pytest.approx(2.0)  # the largest of the three
+
+
+def test_light_roles_are_what_a_bake_reads(scene):
+    from gridlight.scene.read import read_scene
+
+    bpy.ops.object.light_add(type="POINT")
+    lamp = bpy.context.object
+    power = read_scene(scene).lights[0].color[0]
+    lamp.gridlight_light.role, lamp.gridlight_light.group = "DYNAMIC", "CEILING_2"
+    lamp.gridlight_light.intensity = 0.5
+    light = read_scene(scene).lights[0]
+    assert light.dynamic and light.group == "ceiling2"
+    assert light.color[0] == pytest.approx(0.5 * power)
+
+
+def test_add_volume_goes_around_scene_or_selection(scene):
+    bpy.ops.mesh.primitive_cube_add(size=2.0)
+    bpy.ops.mesh.primitive_cube_add(size=2.0, location=(10, 0, 0))
+    assert bpy.ops.gridlight.add_volume(fit="SELECTION") == {"FINISHED"}
+    volume = bpy.context.object
+    assert np.allclose(volume.location, (10, 0, 0), atol=1e-5)
+    assert 1.0 < volume.scale[0] < 1.5
+    bpy.ops.gridlight.fit_volume(fit="SCENE")
+    assert np.allclose(volume.location, (5, 0, 0), atol=1e-5) and volume.scale[0] > 6.0
+
+
+def test_fit_keeps_rotation_and_spacing(scene):
+    bpy.ops.mesh.primitive_cube_add(size=2.0, rotation=(0, 0, 0.6))
+    bpy.context.view_layer.update()
+    turned = np.eye(4)
+    turned[:2, :2] = [[np.cos(0.6), -np.sin(0.6)], [np.sin(0.6), np.cos(0.6)]]
+    volume = create_volume(scene, "Turned", turned * [0.5, 0.5, 0.5, 1], (3, 3, 3))
+    bpy.context.view_layer.objects.active = volume
+    bpy.context.view_layer.update()
+    bpy.ops.gridlight.fit_volume(fit="SCENE")
+    assert volume.rotation_euler[2] == pytest.approx(0.6, abs=1e-5)
+    assert np.allclose(volume.scale, volume.scale[0], rtol=1e-4) and 1.0 < volume.scale[0] < 1.2
+    assert tuple(volume.gridlight_grid.resolution) == (5, 5, 5)
+
+
+def test_operators_say_what_is_missing(scene):
+    assert not bpy.ops.gridlight.bake.poll()
+    assert not bpy.ops.gridlight.export.poll()
+    with pytest.raises(RuntimeError, match="nothing with a surface"):
+        bpy.ops.gridlight.add_volume(fit="SELECTION")
+    with pytest.raises(RuntimeError, match="no surface"):
+        bpy.ops.gridlight.add_volume()
+
+
+def test_bake_is_in_the_file_after_saving_and_loading(room, gpu_context, tmp_path):
+    assert bpy.ops.gridlight.bake() == {"FINISHED"}
+    baked = load_field(room)
+    assert baked.coefficients.shape == (27, 9, 3) and baked.coefficients[:, 0].mean() > 0
+    path = str(tmp_path / "room.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    again = load_field(bpy.data.objects["Room"])
+    for name in ("coefficients", "state", "validity", "offset", "depth"):
+        assert np.array_equal(getattr(again, name), getattr(baked, name)), name
+    assert again.metadata == baked.metadata
+
+
+def test_a_copied_volume_keeps_the_originals_light_apart(room, gpu_context):
+    bpy.ops.gridlight.bake()
+    copy = room.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    bpy.context.view_layer.update()
+    before = load_field(room).coefficients
+    bpy.data.objects["Point"].data.energy = 10.0
+    bpy.context.view_layer.objects.active = copy
+    bpy.ops.gridlight.bake()
+    assert np.array_equal(load_field(room).coefficients, before)
+    assert load_field(copy).coefficients.mean() < 0.2 * before.mean()
+
+
+def test_clear_bake_leaves_nothing(room, gpu_context):
+    bpy.ops.gridlight.bake()
+    assert len(bpy.data.texts) == 1
+    bpy.ops.gridlight.clear_bake()
+    assert not bpy.data.texts and load_field(room) is None
+
+
+def test_deleted_and_moved_probes_are_edits(room):
+    scene = bpy.context.scene
+    bpy.ops.gridlight.place_probes()
+    placed = {item[probe_objects.INDEX_PROPERTY]: item for item in room.children}
+    assert len(placed) == 27 and probe_objects.read_edits(scene, room) is None
+    bpy.data.objects.remove(placed[4])
+    placed[13].location.x += 0.3
+    placed[14].location.z += 5.0
+    for item in (room, bpy.data.objects["Cube"]):
+        item.location.y += 7.0  # probes go with their volume
+    bpy.context.view_layer.update()
+    edits = probe_objects.read_edits(scene, room)
+    assert np.flatnonzero(edits.disabled).tolist() == [4]
+    assert np.allclose(edits.offset[13], (0.3, 0, 0), atol=1e-5)
+    assert np.allclose(edits.offset[14], (0, 0, 0.8), atol=1e-5)  # half a cell
+    assert np.flatnonzero(edits.offset.any(axis=1)).tolist() == [13, 14]
+    bpy.ops.gridlight.place_probes()  # placing again keeps what was done
+    again = probe_objects.read_edits(scene, room)
+    assert np.array_equal(again.disabled, edits.disabled) and np.allclose(again.offset, edits.offset, atol=1e-5)
+    bpy.ops.gridlight.reset_probes()
+    assert probe_objects.read_edits(scene, room) is None and len(room.children) == 27
+
+
+def test_reset_of_selected_probes_leaves_the_others(room):
+    scene = bpy.context.scene
+    bpy.ops.gridlight.place_probes()
+    placed = {item[probe_objects.INDEX_PROPERTY]: item for item in room.children}
+    placed[3].location.x += 0.2
+    placed[5].location.x += 0.2
+    bpy.ops.object.select_all(action="DESELECT")
+    placed[5].select_set(True)
+    bpy.ops.gridlight.reset_probes(selected=True)
+    assert np.flatnonzero(probe_objects.read_edits(scene, room).offset.any(axis=1)).tolist() == [3]
+
+
+def test_a_bake_respects_edited_probes(room, gpu_context):
+    bpy.ops.gridlight.bake()
+    free = load_field(room)
+    bpy.ops.gridlight.place_probes()
+    placed = {item[probe_objects.INDEX_PROPERTY]: item for item in room.children}
+    bpy.data.objects.remove(placed[4])
+    placed[13].location.x += 0.3
+    bpy.ops.gridlight.bake()
+    edited = load_field(room)
+    assert stored_counts(room)["culled"] == 1 and edited.state[4] == 0
+    assert np.allclose(edited.offset[13], (0.3, 0, 0), atol=1e-5)
+    assert not np.allclose(edited.coefficients[13], free.coefficients[13], rtol=1e-2)
+    assert np.allclose(edited.coefficients[0, 0], free.coefficients[0, 0], rtol=0.05)
+
+
+def test_large_grids_become_points(room):
+    room.gridlight_grid.resolution = (20, 20, 8)
+    scene = bpy.context.scene
+    scene.gridlight.keep_all = True
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=2, y_subdivisions=2, size=3)
+    grid = probe_objects.Grid(np.diag([1.6, 1.6, 1.6, 1.0]), (20, 20, 8), "Room")
+    probe_objects.place_probes(scene, grid, np.ones(grid.count, np.uint8), room)
+    assert not room.children
+    (volume, points), *others = probe_objects.placed_points(scene)
+    assert volume == room and points.shape == (3200, 3) and not others
+    assert np.allclose(points.min(axis=0), -1.6)
+    probe_objects.clear_probes(scene)
+    assert not probe_objects.placed_points(scene) and not bpy.data.collections
+
+
+@pytest.mark.parametrize("target", ["exr", "json"])
+def test_export_writes_what_is_stored(room, gpu_context, tmp_path, target):
+    bpy.ops.gridlight.bake()
+    settings = bpy.context.scene.gridlight.export
+    settings.target, settings.directory = target, str(tmp_path / "out")
+    assert bpy.ops.gridlight.export() == {"FINISHED"}
+    files = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert any(name.startswith("probes.") for name in files)
+    if target == "exr":
+        from gridlight.formats import probe_file
+
+        written = probe_file.read(tmp_path / "out" / "probes.exr")
+        assert np.array_equal(written.coefficients, load_field(room).coefficients)
+
+
+def test_report_of_what_is_stored(room, gpu_context):
+    from pathlib import Path
+
+    bpy.ops.gridlight.bake()
+    assert bpy.ops.gridlight.report() == {"FINISHED"}
+    assert "Room" in (Path(bpy.app.tempdir) / "gridlight-report.html").read_text()
+
+
+def test_gallery_is_a_scene_of_its_own(scene):
+    bpy.ops.mesh.primitive_cube_add()
+    before = {item.name: tuple(item.location) for item in scene.objects}
+    assert bpy.ops.gridlight.add_gallery() == {"FINISHED"}
+    assert {item.name: tuple(item.location) for item in scene.objects} == before
+    gallery = bpy.data.scenes["Gridlight Gallery"]
+    groups = {item.gridlight_light.group for item in gallery.objects}
+    assert groups == {"NONE", "CEILING_1", "CEILING_2", "WALL", "DYNAMIC"}
