@@ -25,9 +25,9 @@ class ShapeChange:
     """Triangles that moved, deformed, got other normals or other holes, came or left.
 
     ``old_boxes`` (K, 2, 3) and ``new_boxes`` (K, 2, 3) are world-space corners (low, high), metres, which contain all
-    such triangles before and after, K ≤ MOST_BOXES each. ``triangle_map`` (T,) int64 is the old triangle for each new
-    one, −1 where there was none; None where the triangles are the same in the same order, so that a hierarchy can be
-    refitted.
+    such triangles before and after, K ≤ MOST_BOXES each. ``where`` (T,) bool are those of the newer snapshot.
+    ``triangle_map`` (T,) int64 is the old triangle for each new one, −1 where there was none; None where the triangles
+    are the same in the same order, so that a hierarchy can be refitted.
     """
 
     changed: tuple[str, ...]  # names of objects
@@ -35,6 +35,7 @@ class ShapeChange:
     removed: tuple[str, ...]
     old_boxes: np.ndarray
     new_boxes: np.ndarray
+    where: np.ndarray
     triangle_map: np.ndarray | None
 
     @property
@@ -221,6 +222,7 @@ def _shape_change(old, new, triangle_map, common, differs: np.ndarray) -> ShapeC
         tuple(old.object_names[i] for i in removed),
         boxes_around(old.vertices[old.triangles[old_gone]]),
         boxes_around(new.vertices[new.triangles[new_here]]),
+        new_here,
         triangle_map,
     )
 

@@ -11,7 +11,9 @@ import numpy as np
 
 from ..core import bvh
 from ..core.errors import InputError
+from ..core.scene_changes import SceneChanges, ShapeChange
 from ..core.snapshot import Image, Light, SceneSnapshot
+from .scatter import scatter_rows
 from .textures import ROW, upload
 
 _EXTENSIONS = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2, "MIRROR": 3}
@@ -37,45 +39,95 @@ class SceneTextures:
                 f"scene '{snapshot.name}' has {len(snapshot.triangles)} triangles, {_MOST_TRIANGLES} is the most; hide "
                 "objects from rendering or lower their subdivision"
             )
-        corners = (snapshot.triangle_positions - origin).astype(np.float32)
-        self.hierarchy = bvh.build(corners)
-        order = self.hierarchy.order
-        self.triangle_count = len(order)
-        self.corners = corners[order]
-        clips = np.array([m.alpha_threshold > 0 for m in snapshot.materials] or [False])
-        self.has_alpha = bool(clips.any())
-        self.has_images = bool(snapshot.images)
-        self.light_count = len(snapshot.lights)
-        density = emitter_density[order]
-        self.emitter_count = int((density > 0).sum())
-        # Nearer than this a direction about the normal finds an emitter at least as often as a point on the emitters
-        # falls there.
-        self.emitter_reach = (np.pi * density[density > 0].min()) ** -0.5 if self.emitter_count else 0.0
+        self._origin = np.asarray(origin, float)
+        self._textures = {}
+        self._build(snapshot)
+        self._send_surfaces(snapshot, emitter_density)
+        self._send_images(snapshot)
+        self.set_lights(snapshot.lights, self._origin)
 
-        material = np.clip(snapshot.material_index[order], 0, max(len(snapshot.materials) - 1, 0))
-        rows = np.zeros((self.triangle_count, 3, 4), np.float32)
-        rows[:, :, :3] = self.corners
-        rows[:, 0, 3] = self.hierarchy.leaf_end
-        rows[:, 1, 3] = clips[material]
-        self._textures = {
-            "bvh_nodes": upload(self.hierarchy.nodes, "hierarchy nodes"),
-            "triangle_corners": upload(rows, "triangle corners"),
-            "triangle_attributes": upload(
-                _attributes(snapshot, order, material, self.corners, density), "triangle attributes"
-            ),
-            "materials": upload(_materials(snapshot), "materials"),
-            "emitters": upload(_emitters(density, self.corners), "emitters"),
-            "lights": upload(pack_lights(snapshot.lights, origin), "lights"),
-        }
-        if self.has_images:
-            table, texels = _pack_images(snapshot.images)
-            self._textures["image_table"] = upload(table, "images")
-            self._textures["image_texels"] = upload(texels, "image texels", "RGBA16F")
+    def update(self, snapshot: SceneSnapshot, changes: SceneChanges, emitter_density: np.ndarray) -> str:
+        """Brings the textures from the snapshot before to ``snapshot`` and sends only what ``changes`` ask for.
+
+        Returns what became of the hierarchy: "kept", "refit" or "rebuilt". Triangles keep their numbers unless it is
+        rebuilt.
+        """
+        hierarchy = "kept" if changes.shape is None else self._reshape(snapshot, changes.shape)
+        if hierarchy == "rebuilt" or changes.materials or changes.emission or changes.reflectance:
+            self._send_surfaces(snapshot, emitter_density)
+        elif changes.shape:
+            order = self.hierarchy.order
+            differs = changes.shape.where[order] | (emitter_density[order] != self._density)
+            self._send_surfaces(snapshot, emitter_density, np.flatnonzero(differs))
+        if changes.images:
+            self._send_images(snapshot)
+        if changes.any_light:
+            self.set_lights(snapshot.lights, self._origin)
+        return hierarchy
 
     def set_lights(self, lights: list[Light], origin: np.ndarray) -> None:
         """Other lights for the same surfaces."""
         self._textures["lights"] = upload(pack_lights(lights, origin), "lights")
         self.light_count = len(lights)
+
+    def _build(self, snapshot: SceneSnapshot) -> None:
+        corners = (snapshot.triangle_positions - self._origin).astype(np.float32)
+        self.hierarchy = self._built = bvh.build(corners)
+        self.corners = corners[self.hierarchy.order]
+        self.triangle_count = len(corners)
+        self._textures["bvh_nodes"] = upload(self.hierarchy.nodes, "hierarchy nodes")
+
+    def _reshape(self, snapshot: SceneSnapshot, shape: ShapeChange) -> str:
+        """Refits the hierarchy where that serves."""
+        if shape.triangle_map is None:
+            order = self.hierarchy.order
+            corners = np.empty_like(self.corners)
+            corners[order] = self.corners
+            moved = snapshot.vertices[snapshot.triangles[shape.where]] - self._origin
+            corners[shape.where] = moved.astype(np.float32)
+            refitted, nodes = bvh.refit(self.hierarchy, corners, shape.where)
+            if not bvh.stretched(refitted, self._built):
+                self.hierarchy, self.corners = refitted, corners[order]
+                scatter_rows(self._textures["bvh_nodes"], nodes, refitted.nodes[nodes])
+                return "refit"
+        self._build(snapshot)
+        return "rebuilt"
+
+    def _send_surfaces(self, snapshot: SceneSnapshot, density: np.ndarray, only: np.ndarray | None = None) -> None:
+        """Materials, emitters, and corners and attributes of all triangles or of those at ``only`` (K,) in leaf
+        order."""
+        order = self.hierarchy.order
+        clips = np.array([m.alpha_threshold > 0 for m in snapshot.materials] or [False])
+        self.has_alpha = bool(clips.any())
+        self._density = density[order]
+        sampled = self._density[self._density > 0]
+        self.emitter_count = len(sampled)
+        # Nearer than this a direction about the normal finds an emitter at least as often as a point on the emitters
+        # falls there.
+        self.emitter_reach = (np.pi * sampled.min()) ** -0.5 if len(sampled) else 0.0
+        self._textures["materials"] = upload(_materials(snapshot), "materials")
+        self._textures["emitters"] = upload(_emitters(self._density, self.corners, order), "emitters")
+
+        at = slice(None) if only is None else only
+        material = np.clip(snapshot.material_index[order[at]], 0, max(len(snapshot.materials) - 1, 0))
+        corners = self.corners[at]
+        rows = np.zeros((len(corners), 3, 4), np.float32)
+        rows[:, :, :3] = corners
+        rows[:, 0, 3] = self.hierarchy.leaf_end[at]
+        rows[:, 1, 3] = clips[material]
+        attributes = _attributes(snapshot, order[at], material, corners, self._density[at])
+        for name, values in (("triangle_corners", rows), ("triangle_attributes", attributes)):
+            if only is None:
+                self._textures[name] = upload(values, name.replace("_", " "))
+            elif len(only):
+                scatter_rows(self._textures[name], only, values)
+
+    def _send_images(self, snapshot: SceneSnapshot) -> None:
+        self.has_images = bool(snapshot.images)
+        if self.has_images:
+            table, texels = _pack_images(snapshot.images)
+            self._textures["image_table"] = upload(table, "images")
+            self._textures["image_texels"] = upload(texels, "image texels", "RGBA16F")
 
     @property
     def surface_defines(self) -> dict:
@@ -143,9 +195,12 @@ def _attributes(
     return rows
 
 
-def _emitters(density: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """(E, 4) rows of emitter_lib's emitters for triangles (T, 3, 3) in leaf order with ``density`` (T,)."""
+def _emitters(density: np.ndarray, corners: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """(E, 4) rows of emitter_lib's emitters for triangles (T, 3, 3) in leaf ``order`` (T,) with ``density`` (T,).
+
+    They stand in the snapshot's order: which point a random number picks then does not depend on the hierarchy."""
     triangle = np.flatnonzero(density > 0)
+    triangle = triangle[np.argsort(order[triangle])]
     edge = (corners[triangle, 1:] - corners[triangle, :1]).astype(np.float64)
     area = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1) / 2
     rows = np.zeros((len(triangle), 4), np.float32)
