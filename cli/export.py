@@ -51,8 +51,9 @@ def add_arguments(parser, in_blender: bool) -> None:
 def check(args) -> None:
     """Raises InputError for what can be told without reading anything."""
     check_path(args.to, args.output)
-    options = _options(args)
-    axes_matrix(options.axes or TARGETS[args.to].AXES)
+    _options(args)
+    if args.axes is not None:
+        axes_matrix(args.axes)
     if args.scene is not None and (args.to != "three" or (args.axes or "y-up") != "y-up" or args.scale != 1):
         raise InputError("--scene puts a GLB beside probes in metres, Y up: use it with --to three alone")
 

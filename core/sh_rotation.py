@@ -17,7 +17,8 @@ def rotation(matrix: np.ndarray, bands: int) -> np.ndarray:
     closed under ``matrix``, so the solution is exact to rounding.
     """
     directions = texel_directions(4).reshape(-1, 3)
-    return np.linalg.lstsq(basis(directions, bands), basis(directions @ matrix, bands), rcond=None)[0]
+    found = np.linalg.lstsq(basis(directions, bands), basis(directions @ matrix, bands), rcond=None)[0]
+    return np.where(np.abs(found) < 1e-13, 0.0, found)
 
 
 def rotate(coefficients: np.ndarray, matrix: np.ndarray) -> np.ndarray:

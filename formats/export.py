@@ -155,7 +155,7 @@ def export(
     folder, stem = check_path(target, path)
     module = TARGETS[target]
     prepared, filled = prepare(source, options, module.BANDS)
-    axes = axes_matrix(options.axes or module.AXES)
+    axes = axes_matrix(module.AXES if options.axes is None else options.axes)
     encode = Encoder(options.precision or module.PRECISION)
     with StagedFolder(folder) as staged:
         job = ExportJob(converted(prepared, axes, options.scale), source, options, encode, staged, stem)
@@ -165,9 +165,7 @@ def export(
         conventions = {"format": target, **_conventions(module, job, axes, layout, Path(source_path).name, filled)}
         for name in staged.names:
             if source_path and Path(source_path).resolve() == (folder / name).resolve():
-                raise InputError(
-                    f"{folder / name} is the probe file that is being exported; choose another name with -o"
-                )
+                raise InputError(f"{folder / name} is the probe file itself; choose another name with -o")
         job.path(".conventions.json").write_text(json.dumps(conventions, indent=2) + "\n", encoding="utf-8")
     files = [os.fspath(folder / name) for name in staged.names]
     return ExportResult(files, conventions["does_not_carry"], job.warnings, conventions)

@@ -47,7 +47,7 @@ def write(job) -> dict:
         "arrangement": options.layout,
     }
     if options.layout == "equirect":
-        turn = axes_matrix(options.axes or AXES)
+        turn = axes_matrix(AXES if options.axes is None else options.axes)
         directions = panorama_directions(2 * options.size, options.size)[::-1] @ turn.T
         write_image(job.path(".exr"), _picture(job, coefficients, directions))
         return layout

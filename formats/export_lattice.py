@@ -75,7 +75,9 @@ def converted(field: Field, axes: np.ndarray, scale: float) -> Lattice:
     matrix = np.asarray(field.grid.matrix, float).copy()
     matrix[:3] = scale * (axes @ matrix[:3])
     grid = Grid(matrix, field.grid.resolution, field.grid.name)
-    return Lattice(grid, rotate(field.coefficients, axes).astype(np.float32), field.state)
+    turned = not np.array_equal(axes, np.eye(3))
+    coefficients = rotate(field.coefficients, axes) if turned else field.coefficients
+    return Lattice(grid, coefficients.astype(np.float32), field.state)
 
 
 def reordered(lattice: Lattice, order: tuple[int, int, int], flips: tuple[bool, bool, bool]) -> Lattice:
