@@ -96,11 +96,12 @@ class ViewportPass:
         self._all_visible = upload(np.ones((self._object_count, 4)), "objects")
         self._fields: list[FieldTextures] = []
         self._boxes = None
-        self._background = background_texture(world)
+        self.set_world(world)
         vertices = np.arange(3 * CLUSTER_SIZE, dtype=np.float32)
         self._clusters = _batch(self._surface_program(None), "vertex_number", vertices)
 
     def set_world(self, world: World) -> None:
+        self.world_shines = world.map is not None or any(world.color)
         self._background = background_texture(world)
 
     def set_fields(self, fields: list[FieldTextures]) -> None:
@@ -118,10 +119,19 @@ class ViewportPass:
         rows[: len(flags), 0] = flags
         return upload(rows, "objects")
 
-    def draw(self, picture: Picture, view: View, shading: Shading, probes: Probes | None, visible=None) -> None:
+    def draw(
+        self,
+        picture: Picture,
+        view: View,
+        shading: Shading,
+        probes: Probes | None,
+        visible: gpu.types.GPUTexture | None = None,
+        backdrop: bool = True,
+    ) -> None:
         """Adds one sample to ``picture``. ``view`` is in world space, ``visible`` comes from the method of that name.
 
-        Sets GPU state without restoring it.
+        Where nothing is hit there is the world in views of light, unless ``backdrop`` is False. Sets GPU state without
+        restoring it.
         """
         local = view.relative_to(self._origin)
         self._sample = _Sample(
@@ -147,7 +157,7 @@ class ViewportPass:
                 self._draw_surfaces(volume, depth_only=False)
             for field, item in zip(self._fields, spheres):
                 self._draw_spheres(field, item, depth_only=False)
-            if shading.shows_light:
+            if shading.shows_light and backdrop:
                 gpu.state.depth_test_set("LESS_EQUAL")
                 self._draw_background()
         picture.samples += 1

@@ -105,7 +105,9 @@ def _draw_view() -> None:
         return
     before = _state()
     shading, probes = shading_of(preview)
-    picture, _ = images.draw(context, session, shading, probes)
+    # A black world would hide the grid and the theme's backdrop and show nothing instead.
+    backdrop = session.gpu.drawing.world_shines
+    picture, _ = images.draw(context, session, shading, probes, backdrop)
     session.readout.frame()
     gpu.state.depth_test_set("LESS_EQUAL")
     gpu.state.depth_mask_set(True)
@@ -173,7 +175,9 @@ def _tick() -> float | None:
         version = session.version
         session.update(scene, _view_layer(scene))
         busy |= session.is_pending
-        if session.version != version:
+        settings = _shown_settings(scene)
+        if session.version != version or session.shown_settings != settings:
+            session.shown_settings = settings
             _redraw_views(scene)
             busy = True
     for area, scene in _views():
@@ -181,6 +185,12 @@ def _tick() -> float | None:
             area.tag_redraw()
             busy = True
     return _FRAME_SECONDS if busy else _IDLE_SECONDS
+
+
+def _shown_settings(scene: bpy.types.Scene) -> tuple:
+    """What decides how a picture looks besides what is in it: scripts that set it do not make Blender redraw."""
+    preview, view = scene.gridlight.preview, scene.view_settings
+    return *shading_of(preview), preview.exposure, preview.tone_curve, view.exposure, view.gamma
 
 
 def _views():

@@ -108,5 +108,5 @@ def _corner(context: bpy.types.Context) -> tuple[float, float]:
     if context.preferences.system.use_region_overlap:
         for region in context.area.regions:
             if region.type == "TOOLS" and region.alignment == "LEFT" and region.width > 1:
-                covered = region.width
+                covered = max(region.x + region.width - context.region.x, 0)
     return covered + _MARGIN * scale, _MARGIN * scale

@@ -32,6 +32,7 @@ class SceneSession:
         self.version = 0
         self.updates = 0  # of the depsgraph: visibility may have changed
         self.message = ""  # why there is nothing to see
+        self.shown_settings: tuple = ()
         self.readout = Readout()
         self.gpu: GpuScene | None = None  # None before the first read, and for scenes without surface
         self.snapshot: SceneSnapshot | None = None

@@ -55,9 +55,15 @@ class ViewImages:
         )
 
     def draw(
-        self, context: bpy.types.Context, session: SceneSession, shading: Shading, probes: Probes | None
+        self,
+        context: bpy.types.Context,
+        session: SceneSession,
+        shading: Shading,
+        probes: Probes | None,
+        backdrop: bool = True,
     ) -> tuple[Picture, View]:
-        """The picture of the context's region with one sample more where it is not finished."""
+        """The picture of the context's region with one sample more where it is not finished. Without ``backdrop`` the
+        world behind the scene is left out."""
         region, region_3d = context.region, context.region_data
         image = self._images.setdefault((context.area.as_pointer(), region.as_pointer()), _RegionImage())
         view = View.from_matrices(np.array(region_3d.view_matrix), np.array(region_3d.window_matrix))
@@ -68,6 +74,7 @@ class ViewImages:
             (region.width, region.height),
             shading,
             probes,
+            backdrop,
             image.visible_flags.tobytes(),
         )
         if image.shown != wanted:
@@ -78,7 +85,7 @@ class ViewImages:
             self._restart(image, region, 1)
         if image.picture.samples < SAMPLES:
             started = time.perf_counter()
-            session.gpu.drawing.draw(image.picture, view, shading, probes, image.visible)
+            session.gpu.drawing.draw(image.picture, view, shading, probes, image.visible, backdrop)
             if image.picture.samples == 1:
                 image.picture.wait()
                 pixels = image.picture.width * image.picture.height
