@@ -6,15 +6,15 @@ _unregister = []
 
 def _modules() -> tuple:
     """Modules with operators, in the order of registration. Imported here: the package must load without Blender."""
-    from . import bake, export, gallery, place_probes, report, stale, volume
+    from . import bake, explore, export, gallery, place_probes, preview, report, stale, volume
 
-    return volume, place_probes, bake, stale, gallery, export, report
+    return volume, place_probes, bake, stale, gallery, preview, explore, export, report
 
 
 def register():
     import bpy
 
-    from . import bake, properties, stale
+    from . import bake, explore, preview, properties, stale
 
     modules = _modules()
     classes = [item for module in modules for item in module.classes]
@@ -25,6 +25,9 @@ def register():
     _unregister.append(properties.detach)
     stale.attach()
     _unregister.append(stale.detach)
+    preview.attach()
+    _unregister.append(preview.detach)
+    _unregister.append(explore.stop_running)
     _unregister.append(lambda: bake.stop_running("The bake was given up, because Gridlight was switched off"))
 
 

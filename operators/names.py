@@ -16,6 +16,10 @@ RELIGHT = "gridlight.relight"
 CLEAR_BAKE = "gridlight.clear_bake"
 CHECK_BAKE = "gridlight.check_bake"
 
+PREVIEW = "gridlight.preview"
+PICK_PROBE = "gridlight.pick_probe"
+EXPLORE = "gridlight.explore"
+
 EXPORT = "gridlight.export"
 REPORT = "gridlight.report"
 
