@@ -12,7 +12,7 @@ from bpy.props import BoolProperty
 from .. import viewport
 from ..core.errors import Cancelled, GridlightError
 from ..scene.field_storage import remove_field, stored_text
-from . import names
+from . import names, stale
 from .bake_task import BakeTask
 from .sidebar import redraw_sidebars
 from .volume_choice import chosen_volumes, in_object_mode, volumes_of
@@ -147,6 +147,8 @@ class GRIDLIGHT_OT_bake(bpy.types.Operator):
         self.report({"INFO"}, task.outcome)
         for volume in volumes_of(context.scene):
             viewport.field_changed(volume)
+        if not bpy.app.background:
+            stale.note_edit(context.scene)  # it may have been edited while it was baked
         return {"FINISHED"}
 
     def _failed(self, error: GridlightError) -> set[str]:

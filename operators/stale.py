@@ -16,7 +16,6 @@ from ..formats.probe_metadata import scene_hash
 from ..scene.field_storage import has_moved, stored_details, stored_text
 from ..scene.read import read_scene
 from . import names
-from .bake import running_task
 from .sidebar import redraw_sidebars
 from .volume_choice import in_object_mode, volumes_of
 
@@ -91,7 +90,7 @@ def _scene_edited(scene, depsgraph) -> None:
     if scene.session_uid in _edited:
         _last_edit = time.monotonic()
     else:
-        _note_edit(scene)
+        note_edit(scene)
 
 
 @persistent
@@ -99,11 +98,11 @@ def _file_loaded(*_arguments) -> None:
     """Another file, or an earlier state of this one: nothing is known any more."""
     forget()
     for window in bpy.context.window_manager.windows:
-        _note_edit(window.scene)
+        note_edit(window.scene)
 
 
-def _note_edit(scene: bpy.types.Scene) -> None:
-    """The scene may differ from what was baked in it, if anything was."""
+def note_edit(scene: bpy.types.Scene) -> None:
+    """The scene may differ from what was baked in it, if anything was: it will be compared."""
     global _last_edit
     if any(stored_text(volume) for volume in volumes_of(scene)):
         _edited.add(scene.session_uid)
@@ -119,7 +118,7 @@ def _look_when_at_rest() -> float | None:
         return _REST_SECONDS - waited
     for window in bpy.context.window_manager.windows:
         scene, screen = window.scene, window.screen
-        if scene.session_uid not in _edited or running_task() is not None or screen.is_animation_playing:
+        if scene.session_uid not in _edited or screen.is_animation_playing:
             continue
         if _read_seconds.get(scene.session_uid, 0.0) <= _QUICK_SECONDS:
             compare(scene, window.view_layer)

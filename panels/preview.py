@@ -28,10 +28,11 @@ class GRIDLIGHT_PT_preview(SidebarPanel, bpy.types.Panel):
         )
         if not any(stored_text(volume) for volume in volumes_of(context.scene)):
             paragraph(layout, context, "Nothing is baked yet: only direct light will be seen", "INFO")
+        if not preview.enabled:
+            return
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column()
-        column.active = preview.enabled
         column.prop(preview, "mode")
         column.prop(preview, "exposure")
         column.prop(preview, "tone_curve")
@@ -43,6 +44,10 @@ class GRIDLIGHT_PT_preview_probes(SidebarPanel, bpy.types.Panel):
     bl_parent_id = "GRIDLIGHT_PT_preview"
     bl_options = {"DEFAULT_CLOSED"}
 
+    @classmethod
+    def poll(cls, context):
+        return context.scene.gridlight.preview.enabled
+
     def draw_header(self, context):
         self.layout.prop(context.scene.gridlight.preview, "show_probes", text="")
 
@@ -51,7 +56,7 @@ class GRIDLIGHT_PT_preview_probes(SidebarPanel, bpy.types.Panel):
         preview = context.scene.gridlight.preview
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.active = preview.enabled and preview.show_probes
+        layout.active = preview.show_probes
         layout.prop(preview, "probe_size")
         layout.prop(preview, "probe_shading")
 
@@ -60,6 +65,10 @@ class GRIDLIGHT_PT_preview_live(SidebarPanel, bpy.types.Panel):
     bl_label = "Live Updates"
     bl_parent_id = "GRIDLIGHT_PT_preview"
     bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return context.scene.gridlight.preview.enabled
 
     def draw_header(self, context):
         self.layout.prop(context.scene.gridlight.preview, "live", text="")
@@ -70,11 +79,9 @@ class GRIDLIGHT_PT_preview_live(SidebarPanel, bpy.types.Panel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column()
-        column.active = preview.enabled and preview.live
+        column.active = preview.live
         column.prop(preview, "frame_budget_ms", text="Budget (ms)")
-        column = layout.column()
-        column.active = preview.enabled
-        column.prop(preview, "show_rate")
+        layout.prop(preview, "show_rate")
 
 
 classes = (GRIDLIGHT_PT_preview, GRIDLIGHT_PT_preview_probes, GRIDLIGHT_PT_preview_live)

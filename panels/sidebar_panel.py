@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import blf
 import bpy
 
 from ..operators.names import CATEGORY
 
-_LINE_PIXELS = 7  # of one letter at scale 1, on average
-_MARGIN_PIXELS = 60
+_FONT = 0  # the interface's own
+_LETTER_POINTS = 11
+_MARGIN, _ICON = 50, 22  # pixels at scale 1: what panels keep free at their sides, and what an icon takes
 
 
 class SidebarPanel:
@@ -21,13 +23,15 @@ class SidebarPanel:
 
 def paragraph(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
     """``text`` in as many lines as the sidebar's width asks for; labels do not wrap by themselves."""
-    letters = max(int((context.region.width / context.preferences.system.ui_scale - _MARGIN_PIXELS) / _LINE_PIXELS), 16)
+    scale = context.preferences.system.ui_scale
+    width = context.region.width - scale * (_MARGIN + (_ICON if icon != "NONE" else 0))
+    blf.size(_FONT, _LETTER_POINTS * scale)
     column = layout.column(align=True)
     column.scale_y = 0.8
     line = ""
     lines = []
     for word in text.split():
-        if line and len(line) + 1 + len(word) > letters:
+        if line and blf.dimensions(_FONT, f"{line} {word}")[0] > width:
             lines.append(line)
             line = word
         else:

@@ -29,15 +29,16 @@ class GRIDLIGHT_PT_volume(SidebarPanel, bpy.types.Panel):
             column.operator(names.ADD_GALLERY, text="Add Gallery", icon="HOME")
             return
         active = active_volume(context)
+        row = layout.row()
         if len(volumes) > 1:
-            _list(layout, volumes, active)
+            _list(row.column(align=True), volumes, active)
         else:
-            layout.label(text=active.name, icon="LIGHTPROBE_VOLUME")
+            row.label(text=active.name, icon="LIGHTPROBE_VOLUME")
+        row.operator(names.ADD_VOLUME, text="", icon="ADD")
         if active is None:
             paragraph(layout, context, "Select a volume to see and change it", "INFO")
         else:
-            _grid(layout, context, active)
-        layout.operator(names.ADD_VOLUME, text="Add Volume", icon="ADD")
+            _grid(layout, active)
 
 
 class GRIDLIGHT_PT_probes(SidebarPanel, bpy.types.Panel):
@@ -61,8 +62,7 @@ class GRIDLIGHT_PT_probes(SidebarPanel, bpy.types.Panel):
         row.operator(names.CLEAR_PROBES, text="Clear", icon="X")
 
 
-def _list(layout, volumes, active) -> None:
-    column = layout.column(align=True)
+def _list(column, volumes, active) -> None:
     for volume in volumes:
         counts = " × ".join(map(str, resolution_of(volume)))
         chosen = volume == active
@@ -72,16 +72,15 @@ def _list(layout, volumes, active) -> None:
         button.volume = volume.name
 
 
-def _grid(layout, context, volume) -> None:
-    layout.use_property_split = True
-    layout.use_property_decorate = False
-    column = layout.column()
-    column.prop(volume.gridlight_grid, "resolution")
-    column.prop(volume.gridlight_grid, "spacing")
-    layout.use_property_split = False
+def _grid(layout, volume) -> None:
+    grid = volume.gridlight_grid
     row = layout.row(align=True)
-    row.label(text="Fit to")
-    row.operator_enum(names.FIT_VOLUME, "fit")
+    for axis in range(3):
+        row.prop(grid, "resolution", index=axis, text="XYZ"[axis])
+    layout.prop(grid, "spacing")
+    row = layout.row(align=True)
+    for fit, title in (("SCENE", "Fit to Scene"), ("SELECTION", "To Selection")):
+        row.operator(names.FIT_VOLUME, text=title).fit = fit
 
 
 def _counts(layout, volume) -> None:

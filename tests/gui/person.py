@@ -19,6 +19,7 @@ import numpy as np
 
 EXTENSION = "bl_ext.user_default.gridlight"
 READING_SCALE = 3  # letters of the interface are 11 pixels high; text recognition wants about 30
+LOOKS = 6  # at the screen before a person gives up looking for something
 REACTION_SECONDS = 0.25  # between a click and what it shows
 
 
@@ -172,8 +173,12 @@ class Person:
     def click_text(self, text: str, rectangle: Rectangle | None = None) -> Iterator[float]:
         """Reads the screen until ``text`` is found and clicks it. By default in the 3D viewport's sidebar."""
         rectangle = rectangle or self.rectangle(self.region("UI"))
-        place = self.find(text, rectangle)
-        if place is None:
+        for _ in range(LOOKS):
+            place = self.find(text, rectangle)
+            if place is not None:
+                break
+            yield 2 * REACTION_SECONDS
+        else:
             self.picture("unread")
             seen = " ".join(word for word, _ in self.read(rectangle))
             raise AssertionError(f"'{text}' is not on the screen at {rectangle}; what is: {seen}")
@@ -215,7 +220,7 @@ class Person:
             operator.bl_idname
             for window in bpy.context.window_manager.windows
             for operator in window.modal_operators
-            if operator.bl_idname.startswith("GRIDLIGHT_")
+            if operator and operator.bl_idname.startswith("GRIDLIGHT_")  # None: of a class that is gone
         ]
         assert not running, running
 

@@ -13,6 +13,7 @@ import sys
 import traceback
 from pathlib import Path
 
+import addon_utils
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -20,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from person import EXTENSION, Person  # noqa: E402  (beside this file, which is no package)
 
 POLL_SECONDS = 0.05
+FIRST_SECONDS = 1.5  # a window that has just appeared takes no notice of clicks
 SETTLE_SECONDS = 0.3  # after loading a file: time for its windows to be drawn
 
 
@@ -53,6 +55,7 @@ class Server:
 
 def _scenario(file: str, name: str):
     """A fresh file, the scenario, and what must hold after each."""
+    addon_utils.enable(EXTENSION)  # a scenario may have failed with the extension switched off
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     yield SETTLE_SECONDS
     spec = importlib.util.spec_from_file_location(Path(file).stem, file)
@@ -82,7 +85,7 @@ def _start() -> None:
     bpy.ops.extensions.package_install_files(filepath=extension, repo="user_default", enable_on_install=True)
     if EXTENSION not in preferences.addons:
         raise RuntimeError(f"{extension} did not install as {EXTENSION}")
-    bpy.app.timers.register(Server(Path(folder)), first_interval=SETTLE_SECONDS, persistent=True)
+    bpy.app.timers.register(Server(Path(folder)), first_interval=FIRST_SECONDS, persistent=True)
     _write(Path(folder) / "ready.json", {})
 
 

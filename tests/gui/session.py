@@ -53,11 +53,16 @@ class BlenderSession:
         self._process: subprocess.Popen | None = None
         self._folder: Path | None = None
         self._serial = 0
+        self._broken = False  # starting failed: the next tests need not try again
 
     def run(self, file: str, name: str, timeout: float) -> None:
         """Runs scenario ``name`` of ``file`` and fails the test with what went wrong there."""
+        if self._broken:
+            pytest.fail(f"Blender ({self._backend}) cannot be started, see the first failure", pytrace=False)
         if self._process is None or self._process.poll() is not None:
+            self._broken = True
             self._start()
+            self._broken = False
         self._serial += 1
         task = self._folder / f"task{self._serial}.json"
         _write(task, {"file": file, "name": name})
