@@ -32,6 +32,7 @@ from .openexr_file import reason
 
 ATTRIBUTE = "gridlight"
 MAX_BYTES = 1 << 30  # of pixels; a reader that checks the header first never allocates more
+_MOST_COMPRESSION = 1100  # no stream of deflate, which ZIP is, gives more than 1032 times its size
 DEPTH_TEXELS = DEPTH_EDGE * DEPTH_EDGE
 CONVENTIONS = {
     "space": "right-handed, Z up, metres",
@@ -89,16 +90,19 @@ def write(path, field: Field) -> None:
     import OpenEXR
 
     check_size(field.grid, field.bands)
-    planes = _planes(field)
-    names = channel_names(field.bands)
-    finite = np.isfinite(planes).all(axis=(1, 2))
-    if not finite.all():
-        name = names[int(np.argmin(finite))]
-        raise InputError(f"{field.grid.name}: channel {name} holds values that are not finite; nothing was written")
     text = _json(describe(field))
-    document = {**json.loads(text), "digest": _digest(text, planes)}
+    digest = hashlib.sha256(text.encode())
+    nx, ny, nz = field.grid.resolution
+    planes = {}
+    for name, column in zip(channel_names(field.bands), _columns(field)):
+        plane = np.ascontiguousarray(column, "<f4")
+        if not np.isfinite(plane).all():
+            raise InputError(f"{field.grid.name}: channel {name} holds values that are not finite; nothing was written")
+        digest.update(plane)
+        planes[name] = plane.reshape(ny * nz, nx)
+    document = {**json.loads(text), "digest": digest.hexdigest()}
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, ATTRIBUTE: _json(document)}
-    openexr_file.write(path, header, dict(zip(names, planes)))
+    openexr_file.write(path, header, planes)
 
 
 def read(path) -> Field:
@@ -121,43 +125,17 @@ def read(path) -> Field:
     try:
         with openexr_file.silent():
             document, grid, bands = _check_header(path, OpenEXR.File(path, header_only=True).header())
-            channels = OpenEXR.File(path, separate_channels=True).channels()
-            planes = _gather(path, channels, grid, bands)
+            return _take(path, OpenEXR.File(path, separate_channels=True).channels(), document, grid, bands)
     except (RuntimeError, ValueError, TypeError, OverflowError, UnicodeDecodeError) as error:
         # What OpenEXR's binding raises for files that end early or contradict themselves.
         raise InputError(f"{path} is truncated or damaged ({reason(error)}); bake it again or restore a copy") from None
-    _check_values(path, document, planes, bands)
-    return _field(document, grid, bands, planes)
 
 
-def _planes(field: Field) -> np.ndarray:
-    """(channels, ny·nz, nx) float32, C order: all numbers of ``field``."""
-    nx, ny, nz = field.grid.resolution
-    count = field.grid.count
-    columns = [
-        np.asarray(field.coefficients, np.float32).reshape(count, -1),
-        np.asarray(field.state, np.float32)[:, None],
-        np.asarray(field.validity, np.float32)[:, None],
-        np.asarray(field.offset, np.float32),
-        np.asarray(field.depth[:, :, 0], np.float32),
-        np.asarray(field.depth[:, :, 1], np.float32),
-    ]
-    flat = np.concatenate(columns, axis=1)
-    return np.ascontiguousarray(flat.T).reshape(-1, ny * nz, nx)
-
-
-def _field(document: dict, grid: Grid, bands: int, planes: np.ndarray) -> Field:
-    flat = planes.reshape(len(planes), -1)
-    split = 3 * bands * bands
-    return Field(
-        grid,
-        np.ascontiguousarray(flat[:split].T).reshape(-1, bands * bands, 3),
-        flat[split].astype(np.uint8),
-        flat[split + 1].copy(),
-        np.ascontiguousarray(flat[split + 2 : split + 5].T),
-        np.ascontiguousarray(flat[split + 5 :].reshape(2, DEPTH_TEXELS, -1).transpose(2, 1, 0)),
-        document,
-    )
+def _columns(field: Field) -> list[np.ndarray]:
+    """Views of ``field`` in the order of ``channel_names``, (P,) each; the one place that knows where what is."""
+    columns = list(field.coefficients.reshape(field.grid.count, -1).T)
+    columns += [field.state, field.validity, *field.offset.T]
+    return columns + [*field.depth[:, :, 0].T, *field.depth[:, :, 1].T]
 
 
 def _check_header(path: str, header: dict) -> tuple[dict, Grid, int]:
@@ -180,9 +158,7 @@ def _check_header(path: str, header: dict) -> tuple[dict, Grid, int]:
             f"{FORMAT_VERSION[0]}; update Gridlight"
         )
     grid, bands = _announced_grid(path, document)
-    size = _pixel_bytes(grid, bands)
-    if size > MAX_BYTES:
-        raise InputError(f"{path} announces {size >> 20} MiB of probes; the limit is {MAX_BYTES >> 20} MiB")
+    _check_memory(path, _pixel_bytes(grid, bands))
     low, high = (np.asarray(corner, np.int64) for corner in header["dataWindow"])
     nx, ny, nz = grid.resolution
     if tuple(high - low + 1) != (nx, ny * nz):
@@ -192,9 +168,17 @@ def _check_header(path: str, header: dict) -> tuple[dict, Grid, int]:
     missing = [name for name in channel_names(bands) if name not in present]
     if missing:
         raise InputError(f"{path} is damaged or incomplete: channel {missing[0]} is missing ({len(missing)} in all)")
-    if len(present) > 4 * len(channel_names(MAX_BANDS)):
-        raise InputError(f"{path} has {len(present)} channels, far more than a probe file needs; it is not read")
+    _check_memory(path, 4 * grid.count * len(present))
     return document, grid, bands
+
+
+def _check_memory(path: str, pixel_bytes: int) -> None:
+    """Refuses, before anything is allocated, pixels that are too many or that so small a file cannot hold."""
+    if pixel_bytes > MAX_BYTES:
+        raise InputError(f"{path} announces {pixel_bytes >> 20} MiB of channels; the limit is {MAX_BYTES >> 20} MiB")
+    size = os.path.getsize(path)
+    if pixel_bytes > _MOST_COMPRESSION * size:
+        raise InputError(f"{path} is truncated or damaged: its {size} bytes cannot hold {pixel_bytes} bytes of probes")
 
 
 def _announced_grid(path: str, document: dict) -> tuple[Grid, int]:
@@ -214,40 +198,31 @@ def _announced_grid(path: str, document: dict) -> tuple[Grid, int]:
         raise InputError(f"{path} is damaged: {error}") from None
 
 
-def _gather(path: str, channels: dict, grid: Grid, bands: int) -> np.ndarray:
-    """(channels, ny·nz, nx) float32 in the order of ``channel_names``."""
+def _take(path: str, channels: dict, document: dict, grid: Grid, bands: int) -> Field:
+    """The field that ``channels`` hold, which are let go one by one: the whole is in memory once, not twice."""
     nx, ny, nz = grid.resolution
-    planes = np.empty((len(channel_names(bands)), ny * nz, nx), np.float32)
-    for plane, name in zip(planes, channel_names(bands)):
-        pixels = channels[name].pixels
-        if pixels.dtype != np.float32 or pixels.shape != plane.shape:
-            raise InputError(
-                f"{path} is damaged: channel {name} is {pixels.dtype} {pixels.shape}, not 32-bit float {plane.shape}"
-            )
-        plane[:] = pixels
-    return planes
-
-
-def _check_values(path: str, document: dict, planes: np.ndarray, bands: int) -> None:
-    finite = np.isfinite(planes).all(axis=(1, 2))
-    if not finite.all():
-        name = channel_names(bands)[int(np.argmin(finite))]
-        raise InputError(f"{path}: channel {name} holds values that are not finite; bake it again")
-    if not np.isin(planes[3 * bands * bands], (CULLED, ACTIVE, INVALID)).all():
-        raise InputError(f"{path} is damaged: its probe states are not {CULLED}, {ACTIVE} or {INVALID}")
-    digest = document.pop("digest", None)
-    if digest is not None and digest != _digest(_json(document), planes):
+    digest_stated = document.pop("digest", None)
+    digest = hashlib.sha256(_json(document).encode())
+    field = Field.empty(grid, bands)
+    field.metadata = document
+    for name, column in zip(channel_names(bands), _columns(field)):
+        pixels = channels.pop(name).pixels
+        if pixels.dtype != np.float32 or pixels.shape != (ny * nz, nx):
+            shown = f"{pixels.dtype} {pixels.shape}"
+            raise InputError(f"{path} is damaged: channel {name} is {shown}, not 32-bit float ({ny * nz}, {nx})")
+        if not np.isfinite(pixels).all():
+            raise InputError(f"{path}: channel {name} holds values that are not finite; bake it again")
+        if name == "state" and not np.isin(pixels, (CULLED, ACTIVE, INVALID)).all():
+            raise InputError(f"{path} is damaged: its probe states are not {CULLED}, {ACTIVE} or {INVALID}")
+        digest.update(np.ascontiguousarray(pixels, "<f4"))
+        column[:] = pixels.ravel()
+    if digest_stated is not None and digest_stated != digest.hexdigest():
         raise InputError(
             f"{path} does not match its own checksum: it was damaged or edited; bake it again "
             "(or remove 'digest' from its 'gridlight' attribute to use it as it is)"
         )
+    return field
 
 
 def _json(document: dict) -> str:
     return json.dumps(document, allow_nan=False, sort_keys=True, separators=(",", ":"))
-
-
-def _digest(text: str, planes: np.ndarray) -> str:
-    digest = hashlib.sha256(text.encode())
-    digest.update(np.ascontiguousarray(planes, "<f4"))
-    return digest.hexdigest()
