@@ -20,8 +20,7 @@ class Grid:
     """The nodes of one volume.
 
     Raises:
-        InputError: a resolution outside 1..256, a transform that is not finite, or a box without extent along an
-            axis that has more than one node.
+        InputError: a resolution outside 1..256, a transform that is not finite, or a box without volume.
     """
 
     matrix: np.ndarray  # (4, 4) float64, box frame −1..1 to world
@@ -37,14 +36,11 @@ class Grid:
             raise InputError(f"{self.name}: its transform holds values that are not finite; reset its scale")
         axes = self.matrix[:3, :3]
         lengths = np.linalg.norm(axes, axis=0)
-        for axis, count in enumerate(self.resolution):
-            if count > 1 and lengths[axis] <= 0:
-                raise InputError(
-                    f"{self.name}: zero size along {'XYZ'[axis]} with {count} probes; give it an extent or a count of 1"
-                )
-        flat = abs(np.linalg.det(axes / np.where(lengths > 0, lengths, 1))) < 1e-9
-        if flat or not lengths.all():
-            raise InputError(f"{self.name}: its box has no volume; scale it along every axis")
+        if not lengths.all():
+            axis = "XYZ"[int(np.argmin(lengths))]
+            raise InputError(f"{self.name}: zero size along {axis}; scale it along every axis, also one with one probe")
+        if abs(np.linalg.det(axes / lengths)) < 1e-9:
+            raise InputError(f"{self.name}: its box has no volume; undo its shear")
 
     @classmethod
     def from_bounds(cls, low, high, resolution, name: str = "volume") -> Grid:
