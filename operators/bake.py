@@ -22,7 +22,7 @@ _BUDGET_SECONDS = 0.03  # of work in one; a single step may take longer
 _REDRAW_SECONDS = 0.1
 
 _running: _Job | None = None
-_last_outcome = ""
+_last_failure = ""
 
 
 class _Job:
@@ -50,12 +50,12 @@ class _Job:
             workspace.status_text_set(f"Gridlight: {progress}   |   Esc: cancel")
         redraw_sidebars()
 
-    def end(self, outcome: str) -> None:
-        """Puts everything back; more than once does no harm."""
-        global _running, _last_outcome
+    def end(self, failure: str) -> None:
+        """Puts everything back; more than once does no harm. ``failure``: why it came to nothing, or empty."""
+        global _running, _last_failure
         if _running is not self:
             return
-        _running, _last_outcome = None, outcome
+        _running, _last_failure = None, failure
         self._manager.event_timer_remove(self._timer)
         self._manager.progress_end()
         for workspace in self._workspaces:
@@ -89,14 +89,14 @@ class GRIDLIGHT_OT_bake(bpy.types.Operator):
 
     def execute(self, context):
         """Bakes to the end before it returns."""
-        global _last_outcome
+        global _last_failure
+        _last_failure = ""
         try:
             task = BakeTask(context.scene, context.view_layer, chosen_volumes(context, self.everything))
             for _ in task:
                 pass
         except GridlightError as error:
             return self._failed(error)
-        _last_outcome = task.outcome
         return self._finished(context, task)
 
     def invoke(self, context, _event):
@@ -125,7 +125,7 @@ class GRIDLIGHT_OT_bake(bpy.types.Operator):
             while time.perf_counter() < deadline:
                 next(job.task)
         except StopIteration:
-            job.end(job.task.outcome)
+            job.end("")
             return self._finished(context, job.task)
         except GridlightError as error:
             job.end(str(error))
@@ -202,9 +202,9 @@ def running_task() -> BakeTask | None:
     return _running.task if _running is not None else None
 
 
-def last_outcome() -> str:
-    """In one line how the last bake of this session ended; empty before the first."""
-    return _last_outcome
+def last_failure() -> str:
+    """In one line why the last bake of this session came to nothing; empty if it did not."""
+    return _last_failure
 
 
 def stop_running(reason: str) -> None:

@@ -93,9 +93,9 @@ class BakeTask:
                 snapshot, grid, self.settings, self.progress, result, **({"edits": edit} if edit else {})
             )
             results.append(result)
+        self.outcome = _in_words(results, time.perf_counter() - started)
         for volume, result in zip(self._find_volumes(), results):
             self._store(volume, snapshot, result, shown)
-        self.outcome = _in_words(results, time.perf_counter() - started)
 
     def _find_volumes(self) -> list[bpy.types.Object]:
         """The volumes as they are now; undo and renaming may have moved them.
@@ -116,6 +116,7 @@ class BakeTask:
         )
         result.field.metadata = {**result.field.metadata, **metadata}
         details = {
+            "outcome": self.outcome,
             "viewport_hash": viewport_hash,
             "seconds": result.seconds,
             "energy": [float(value) for value in result.energy],

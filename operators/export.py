@@ -6,7 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import BoolProperty, StringProperty
 
 from ..core.errors import GridlightError
 from ..core.field import Field
@@ -19,6 +19,8 @@ from . import names
 from .export_targets import PROBE_FILE
 from .volume_choice import volumes_of
 
+_BESIDE = "//gridlight"
+
 
 class GRIDLIGHT_OT_export(bpy.types.Operator):
     """Write the baked light of all volumes into a folder. In a file that was never saved, the folder is asked for"""
@@ -30,7 +32,7 @@ class GRIDLIGHT_OT_export(bpy.types.Operator):
     directory: StringProperty(
         name="Folder", description="Instead of the folder in the panel", subtype="DIR_PATH", options={"SKIP_SAVE"}
     )
-    filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
+    filter_folder: BoolProperty(default=True, options={"HIDDEN"})
 
     @classmethod
     def poll(cls, context):
@@ -40,8 +42,7 @@ class GRIDLIGHT_OT_export(bpy.types.Operator):
         return True
 
     def invoke(self, context, _event):
-        chosen = context.scene.gridlight.export.directory
-        if not self.directory and chosen.startswith("//") and not bpy.data.filepath:
+        if not (self.directory or _folder(context.scene.gridlight.export)):
             self.directory = str(Path.home() / "")
             context.window_manager.fileselect_add(self)
             return {"RUNNING_MODAL"}
@@ -49,11 +50,10 @@ class GRIDLIGHT_OT_export(bpy.types.Operator):
 
     def execute(self, context):
         settings = context.scene.gridlight.export
-        chosen = self.directory or settings.directory
-        if chosen.startswith("//") and not bpy.data.filepath:
-            self.report({"ERROR"}, f"{chosen} lies beside the .blend, which was never saved; save it or name a folder")
+        folder = Path(self.directory) if self.directory else _folder(settings)
+        if folder is None:
+            self.report({"ERROR"}, "The files go beside the .blend, which was never saved; save it or name a folder")
             return {"CANCELLED"}
-        folder = Path(bpy.path.abspath(chosen))
         try:
             fields = [load_field(volume) for volume in volumes_of(context.scene)]
             written, warnings = _write([field for field in fields if field], settings, folder)
@@ -64,6 +64,14 @@ class GRIDLIGHT_OT_export(bpy.types.Operator):
             self.report({"WARNING"}, warning)
         self.report({"INFO"}, f"{written} files written to {folder}")
         return {"FINISHED"}
+
+
+def _folder(settings) -> Path | None:
+    """Where files go; None for beside a .blend that is not there."""
+    chosen = settings.directory or _BESIDE
+    if chosen.startswith("//") and not bpy.data.filepath:
+        return None
+    return Path(bpy.path.abspath(chosen))
 
 
 def _write(fields: list[Field], settings, folder: Path) -> tuple[int, list[str]]:

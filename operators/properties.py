@@ -152,8 +152,7 @@ class GridlightExport(bpy.types.PropertyGroup):
     target: EnumProperty(name="Format", description="What the files are for", items=TARGET_ITEMS, options=set())
     directory: StringProperty(
         name="Folder",
-        description="Where the files go. // is the folder of this .blend",
-        default="//gridlight",
+        description="Where the files go; empty is a folder \"gridlight\" beside this .blend",
         subtype="DIR_PATH",
         options=set(),
     )

@@ -6,11 +6,11 @@ from __future__ import annotations
 import bpy
 
 from ..operators import names
-from ..operators.bake import last_outcome, running_task
+from ..operators.bake import last_failure, running_task
 from ..operators.quality import QUALITIES
 from ..operators.stale import EDITED, STALE, state_of
 from ..operators.volume_choice import active_volume, volumes_of
-from ..scene.field_storage import has_moved, stored_metadata
+from ..scene.field_storage import has_moved, stored_details, stored_metadata
 from .sidebar_panel import SidebarPanel, paragraph
 
 
@@ -87,23 +87,22 @@ def _state(layout, context) -> None:
     volume = active_volume(context)
     metadata = stored_metadata(volume) if volume else None
     if metadata is None:
-        if last_outcome():
-            paragraph(layout, context, last_outcome(), "INFO")
+        if last_failure():
+            paragraph(layout, context, last_failure(), "INFO")
         return
     state = state_of(context.scene, volume)
+    row = layout.row()
     if has_moved(volume):
-        paragraph(layout, context, "The volume has changed since its light was baked. Bake again", "ERROR")
+        paragraph(row, context, "The volume has changed since its light was baked. Bake again", "ERROR")
     elif state == STALE:
-        paragraph(layout, context, "The scene has changed since this light was baked. Bake again", "ERROR")
+        paragraph(row, context, "The scene has changed since this light was baked. Bake again", "ERROR")
     elif state == EDITED:
-        row = layout.row()
         row.label(text="Edited since the bake", icon="QUESTION")
         row.operator(names.CHECK_BAKE)
     else:
-        layout.label(text="The light is up to date", icon="CHECKMARK")
-    if last_outcome():
-        paragraph(layout, context, last_outcome(), "BLANK1")
-    layout.operator(names.CLEAR_BAKE, icon="TRASH")
+        row.label(text="The light is up to date", icon="CHECKMARK")
+    row.operator(names.CLEAR_BAKE, text="", icon="TRASH")
+    paragraph(layout, context, last_failure() or stored_details(volume).get("outcome", ""), "BLANK1")
 
 
 classes = (GRIDLIGHT_PT_bake, GRIDLIGHT_PT_bake_settings)

@@ -21,7 +21,7 @@ class GRIDLIGHT_PT_export(SidebarPanel, bpy.types.Panel):
         layout.use_property_decorate = False
         column = layout.column()
         column.prop(settings, "target")
-        column.prop(settings, "directory")
+        column.prop(settings, "directory", placeholder="beside the .blend")
         row = layout.row()
         row.scale_y = 1.3
         row.operator(names.EXPORT, icon="EXPORT")

@@ -18,7 +18,7 @@ import bpy
 import numpy as np
 
 EXTENSION = "bl_ext.user_default.gridlight"
-READING_SCALE = 3  # letters of the interface are 11 pixels high; text recognition wants about 30
+READING_SCALE = 4  # letters of the interface are 8 to 11 pixels high; text recognition wants about 40
 LOOKS = 6  # at the screen before a person gives up looking for something
 REACTION_SECONDS = 0.25  # between a click and what it shows
 
@@ -103,22 +103,15 @@ class Person:
 
     def look(self, rectangle: Rectangle | None = None) -> np.ndarray:
         """What the screen shows, (height, width, 3) uint8 sRGB, row 0 at the top."""
-        command = ["import", "-silent", "-window", "root"]
-        if rectangle:
-            command += ["-crop", f"{rectangle.width}x{rectangle.height}+{rectangle.x}+{rectangle.y}", "+repage"]
-        raw = subprocess.run([*command, "-depth", "8", "ppm:-"], capture_output=True, check=True).stdout
+        raw = _grab(rectangle)
         header = re.match(rb"P6\s+(\d+)\s+(\d+)\s+255\s", raw)
         width, height = int(header[1]), int(header[2])
         return np.frombuffer(raw, np.uint8, offset=header.end()).reshape(height, width, 3)
 
     def picture(self, name: str, rectangle: Rectangle | None = None) -> Path:
         """Keeps what the screen shows as ``<scenario>-<name>.png`` among the test's pictures."""
-        folder = Path(os.environ["GRIDLIGHT_PICTURES"])
-        path = folder / f"{self._scenario}-{name}.png"
-        command = ["import", "-silent", "-window", "root"]
-        if rectangle:
-            command += ["-crop", f"{rectangle.width}x{rectangle.height}+{rectangle.x}+{rectangle.y}", "+repage"]
-        subprocess.run([*command, str(path)], check=True)
+        path = Path(os.environ["GRIDLIGHT_PICTURES"]) / f"{self._scenario}-{name}.png"
+        _pipe(["convert", "ppm:-", str(path)], _grab(rectangle))
         return path
 
     def rectangle(self, region: bpy.types.Region | None = None) -> Rectangle:
@@ -128,12 +121,10 @@ class Person:
 
     def read(self, rectangle: Rectangle) -> list[tuple[str, Rectangle]]:
         """Words on the screen and where they stand, in reading order."""
-        picture = ["import", "-silent", "-window", "root"]
-        picture += ["-crop", f"{rectangle.width}x{rectangle.height}+{rectangle.x}+{rectangle.y}", "+repage"]
-        picture += ["-colorspace", "gray", "-negate", "-resize", f"{100 * READING_SCALE}%", "png:-"]
-        image = subprocess.run(picture, capture_output=True, check=True).stdout
+        enlarge = ["-colorspace", "gray", "-negate", "-resize", f"{100 * READING_SCALE}%", "-level", "20%,80%"]
+        image = _pipe(["convert", "ppm:-", *enlarge, "png:-"], _grab(rectangle))
         reading = ["tesseract", "-", "-", "--psm", "11", "--dpi", "300", "tsv"]
-        lines = subprocess.run(reading, input=image, capture_output=True, check=True).stdout.decode().splitlines()[1:]
+        lines = _pipe(reading, image).decode().splitlines()[1:]
         words = []
         for line in lines:
             fields = line.split("\t")
@@ -152,6 +143,14 @@ class Person:
                 first, last = row[0][1], row[-1][1]
                 return Rectangle(first.x, first.y, last.x + last.width - first.x, first.height)
         return None
+
+    def below(self, text: str) -> Rectangle:
+        """The sidebar from below ``text`` on: titles of panels often say the same as buttons in them."""
+        sidebar = self.rectangle(self.region("UI"))
+        place = self.find(text, sidebar)
+        assert place, f"'{text}' is not in the sidebar"
+        top = place.y + place.height + 4
+        return Rectangle(sidebar.x, top, sidebar.width, sidebar.y + sidebar.height - top)
 
     # Hands
     # ------------------------------------------------------------------------------------------------------------------
@@ -183,6 +182,15 @@ class Person:
             seen = " ".join(word for word, _ in self.read(rectangle))
             raise AssertionError(f"'{text}' is not on the screen at {rectangle}; what is: {seen}")
         yield from self.click(*place.center)
+
+    def scroll(self, lines: int, rectangle: Rectangle | None = None) -> Iterator[float]:
+        """Turns the wheel over a part of the screen, by default the sidebar; positive: down."""
+        self.move(*(rectangle or self.rectangle(self.region("UI"))).center)
+        yield REACTION_SECONDS
+        for _ in range(abs(lines)):
+            subprocess.run(["xdotool", "click", "5" if lines > 0 else "4"], check=True)
+            yield REACTION_SECONDS / 4
+        yield REACTION_SECONDS
 
     def key(self, *keys: str) -> Iterator[float]:
         """Presses keys by their X names, "Escape" or "ctrl+z", with the mouse over the 3D viewport."""
@@ -223,6 +231,18 @@ class Person:
             if operator and operator.bl_idname.startswith("GRIDLIGHT_")  # None: of a class that is gone
         ]
         assert not running, running
+
+
+def _grab(rectangle: Rectangle | None) -> bytes:
+    """The screen or a part of it as a binary PPM file."""
+    command = ["import", "-silent", "-window", "root", "-depth", "8"]
+    if rectangle:
+        command += ["-crop", f"{rectangle.width}x{rectangle.height}+{rectangle.x}+{rectangle.y}", "+repage"]
+    return _pipe([*command, "ppm:-"], b"")
+
+
+def _pipe(command: list[str], data: bytes) -> bytes:
+    return subprocess.run(command, input=data, capture_output=True, check=True).stdout
 
 
 def _alike(wanted: str, seen: str) -> bool:

@@ -64,12 +64,15 @@ class BlenderSession:
             self._start()
             self._broken = False
         self._serial += 1
+        said = len(self._log())
         task = self._folder / f"task{self._serial}.json"
         _write(task, {"file": file, "name": name})
         answer = self._wait(self._folder / f"answer{self._serial}.json", timeout)
         if answer["failure"]:
+            log = "\n".join(self._log()[said:][-LOG_TAIL_LINES:])
             pytest.fail(
-                f"in Blender ({self._backend}):\n{answer['failure']}\npictures: {self._pictures}", pytrace=False
+                f"in Blender ({self._backend}):\n{answer['failure']}\npictures: {self._pictures}\nits words:\n{log}",
+                pytrace=False,
             )
 
     def stop(self) -> None:
@@ -102,13 +105,16 @@ class BlenderSession:
             )
         self._wait(self._folder / "ready.json", START_SECONDS)
 
+    def _log(self) -> list[str]:
+        return (self._folder / "blender.log").read_text(errors="replace").splitlines()
+
     def _wait(self, answer: Path, timeout: float) -> dict:
         deadline = time.monotonic() + timeout
         while not answer.exists():
             ended = self._process.poll() is not None
             if ended or time.monotonic() > deadline:
                 what = f"ended with {self._process.returncode}" if ended else f"did not answer within {timeout:.0f} s"
-                log = (self._folder / "blender.log").read_text(errors="replace").splitlines()[-LOG_TAIL_LINES:]
+                log = self._log()[-LOG_TAIL_LINES:]
                 self.stop()
                 pytest.fail(f"Blender ({self._backend}) {what}; its last words:\n" + "\n".join(log), pytrace=False)
             time.sleep(0.05)
