@@ -26,7 +26,7 @@ from .viewport_shading import BACKGROUND_FACE, Shading, background_texture, unif
 CLUSTER_SIZE = 64  # triangles an instance
 MOST_SPHERES = 4096  # drawn of each volume, nearest to the eye first
 MOST_VOLUMES = 16  # 64 vec4 of boxes
-ENCODINGS = ("SCENE_LINEAR", "DISPLAY_LINEAR", "DISPLAY")
+ENCODINGS = ("SCENE_LINEAR", "OVERLAY", "DISPLAY")
 TONE_CURVES = ("STANDARD", "FILMIC", "LINEAR")
 FULL_SCREEN = np.array([[-1, -1], [3, -1], [-1, 3]], np.float32)
 _SQUARE = np.array([[-1, -1], [1, -1], [1, 1], [-1, -1], [1, 1], [-1, 1]], np.float32)

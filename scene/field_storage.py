@@ -47,6 +47,8 @@ def store_field(volume_object: bpy.types.Object, field: Field, scene_hash: str, 
         text = bpy.data.texts.new(f"Gridlight {name}")
         text.use_fake_user = False  # it goes with its volume
         volume_object[POINTER] = text
+    for key in list(text.keys()):
+        del text[key]  # bytes that are assigned to a property that holds some already end at their first zero
     metadata = {**field.metadata, "scene_hash": scene_hash}
     text[_VERSION] = _FORMAT_VERSION
     text["resolution"] = [int(count) for count in field.grid.resolution]

@@ -54,6 +54,8 @@ def sync(_scene: bpy.types.Scene | None = None) -> None:
     elif not wanted and _draw_handles:
         _remove_draw_handlers()
     _free_unused()
+    if not wanted and not sessions.existing():
+        _stop_noticing()
     _redraw_views()
 
 
@@ -115,7 +117,7 @@ def _draw_view() -> None:
     settings = context.scene.view_settings
     display(
         picture,
-        "DISPLAY_LINEAR",
+        "OVERLAY",
         exposure=(settings.exposure + preview.exposure) if shading.shows_amounts else 0.0,
         tone_curve=preview.tone_curve if shading.shows_amounts else "STANDARD",
         gamma=settings.gamma if shading.shows_amounts else 1.0,

@@ -1,22 +1,17 @@
 /* The finished view, fragment stage: mean of the samples, exposure, tone curve, and the depth of the first sample.
  *
- * Encodings: SCENE_LINEAR for render engines, whose view transform Blender applies; DISPLAY_LINEAR for the overlay, which applies the
- * sRGB curve itself; DISPLAY for plain 8-bit images.
+ * Encodings: SCENE_LINEAR for render engines, whose view transform Blender applies; OVERLAY for draw handlers, whose picture Blender merges
+ * with the scene's in a space where a display is a power of 2.2, whatever its view transform; DISPLAY for plain 8-bit images.
  * Tone curves: STANDARD is Blender's view of that name: exposure, clip, sRGB curve (IEC 61966-2-1), gamma. FILMIC rolls highlights off:
  * Hable, "Filmic Tonemapping Operators", 2010, white at 11.2. LINEAR shows the numbers themselves, without the sRGB curve.
  */
 
-const int SCENE_LINEAR = 0, DISPLAY_LINEAR = 1, DISPLAY = 2;
+const int SCENE_LINEAR = 0, OVERLAY = 1, DISPLAY = 2;
 const int STANDARD = 0, FILMIC = 1, LINEAR = 2;
 
 vec3 linear_to_display(vec3 value)
 {
   return mix(12.92 * value, 1.055 * pow(value, vec3(1.0 / 2.4)) - 0.055, greaterThan(value, vec3(0.0031308)));
-}
-
-vec3 display_to_linear(vec3 display)
-{
-  return mix(display / 12.92, pow((display + 0.055) / 1.055, vec3(2.4)), greaterThan(display, vec3(0.04045)));
 }
 
 vec3 shoulder(vec3 x)
@@ -41,7 +36,7 @@ void main()
     color = clamp(color, vec3(0.0), vec3(1.0));
     vec3 display = tone_curve == LINEAR ? color : linear_to_display(color);
     display = pow(display, vec3(1.0 / gamma));
-    color = encoding == DISPLAY ? display : display_to_linear(display);
+    color = encoding == OVERLAY ? pow(display, vec3(2.2)) : display;
   }
   frag_color = vec4(color * coverage, coverage);
   float depth = texelFetch(picture_depth, texel, 0).r;
