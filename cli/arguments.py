@@ -31,6 +31,7 @@ SIGNED_OPTIONS = (
     "--gain",
     "--probe",
     "--size",
+    "--refine",
 )
 
 

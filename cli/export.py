@@ -41,6 +41,13 @@ def add_arguments(parser, in_blender: bool) -> None:
         "--inactive", default="fill", metavar="HOW", help=f"culled and invalid probes: {' or '.join(INACTIVE)}"
     )
     parser.add_argument("--gain", type=float, default=1.0, metavar="F", help="factor on all light (default 1)")
+    parser.add_argument(
+        "--refine",
+        type=int,
+        default=1,
+        metavar="N",
+        help="three: N³ cells of the atlas for each, so that it looks closer to surfaces (default 1)",
+    )
     parser.add_argument("--scene", metavar="FILE.blend", help="three: put its GLB and lamps beside the probes")
     parser.add_argument("--probe", type=counts, metavar="I,J,K", help="cubemap: which (default: nearest to the middle)")
     parser.add_argument("--layout", default="cross", metavar="L", help=f"cubemap: {', '.join(LAYOUTS)}")
@@ -92,6 +99,7 @@ def _options(args) -> ExportOptions:
         precision=args.precision,
         inactive=args.inactive,
         gain=args.gain,
+        refine=args.refine,
         probe=args.probe,
         layout=args.layout,
         size=args.size,

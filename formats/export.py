@@ -66,6 +66,7 @@ class ExportOptions:
     precision: str | None = None
     inactive: str = "fill"  # probes without light of their own: their neighbours' light, or none
     gain: float = 1.0  # factor on all light
+    refine: int = 1  # three: cells of the atlas along each edge of a cell
     probe: tuple[int, int, int] | None = None  # cubemap: which one; None: the active probe nearest to the middle
     layout: str = "cross"
     size: int = 64  # cubemap: edge of a face, height of a panorama
@@ -77,8 +78,9 @@ class ExportOptions:
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
                 raise InputError(f"--{name} is {value}; it must be a number greater than 0")
-        if not 1 <= self.size <= 4096:
-            raise InputError(f"--size is {self.size}; it must lie between 1 and 4096")
+        for name, most in (("size", 4096), ("refine", 16)):
+            if not 1 <= getattr(self, name) <= most:
+                raise InputError(f"--{name} is {getattr(self, name)}; it must lie between 1 and {most}")
         for name, allowed in (("inactive", INACTIVE), ("layout", LAYOUTS), ("precision", (None, *PRECISIONS))):
             if getattr(self, name) not in allowed:
                 raise InputError(f"--{name} {getattr(self, name)}: choose {' or '.join(filter(None, allowed))}")

@@ -118,33 +118,46 @@ def is_sheared(lattice: Lattice) -> bool:
     return bool(np.abs(axes.T @ axes - np.eye(3)).max() > _ALIGNED)
 
 
-def axis_aligned(lattice: Lattice) -> tuple[Lattice, Resampling | None]:
+def axis_aligned(lattice: Lattice, refine: int = 1) -> tuple[Lattice, Resampling | None]:
     """``lattice`` with its box along the target's axes: reordered where it lies along them, else resampled.
 
     The resampled box is the smallest that holds all nodes. A step along any of its axes crosses at most one cell of the
-    old grid, so no node's light is lost. Raises InputError where that needs too many nodes along an axis.
+    old grid, so no node's light is lost. With ``refine`` N cells are cut into N³, and the box grows so that it holds
+    half an old cell around the outermost nodes still; trilinear light stays what it was.
+
+    Raises:
+        InputError: that needs too many nodes along an axis.
     """
     near = nearest_axes(lattice)
-    if is_aligned(near):
+    straight = is_aligned(near)
+    if straight and refine == 1:
         return near, None
     old = near.grid
-    to_lattice = old.world_to_lattice()
     positions = old.positions()
     low, high = positions.min(axis=0), positions.max(axis=0)
-    steps = np.ceil((high - low) * np.abs(to_lattice[:, :3]).max(axis=0) - 1e-9)
-    resolution = np.maximum(steps, 0).astype(int) + 1
-    if resolution.max() > MAX_RESOLUTION:
-        raise InputError(
-            f"{old.name}: this format knows no rotation, and laid straight the volume needs {resolution.max()} probes "
-            f"along one axis, more than {MAX_RESOLUTION}; bake a volume along the world's axes"
-        )
-    size = np.where(high > low, high - low, 1e-3 * np.linalg.norm(old.matrix[:3, :3]))
-    middle = (low + high) / 2
-    grid = Grid.from_bounds(middle - size / 2, middle + size / 2, resolution, old.name)
+    if straight:
+        steps = np.array(old.resolution) - 1
+    else:
+        slope = np.abs(old.world_to_lattice()[:, :3]).max(axis=0)
+        steps = np.ceil((high - low) * slope - 1e-9).astype(int)
+    thin = steps == 0
+    half = np.where(thin, np.abs(old.matrix[:3, :3]).sum(axis=1), (high - low) / 2)
+    border = np.where(thin, 0, -(-(refine - 1) // 2))
+    half = half * (1 + 2 * border / np.where(thin, 1, steps * refine))
+    grid = Grid.from_bounds(old.center - half, old.center + half, _counted(old, steps * refine + 1 + 2 * border))
     nodes, weights = trilinear(old, grid.positions())
     strongest = nodes[np.arange(grid.count), weights.argmax(axis=1)]
     result = Lattice(grid, blend(near.coefficients, nodes, weights), near.state[strongest])
-    return result, Resampling(tuple(int(count) for count in resolution), _difference(near, result))
+    return result, None if straight else Resampling(grid.resolution, _difference(near, result))
+
+
+def _counted(old: Grid, counts: np.ndarray) -> np.ndarray:
+    if counts.max() > MAX_RESOLUTION:
+        raise InputError(
+            f"{old.name}: laid straight and refined it needs {counts.max()} probes along one axis, more than "
+            f"{MAX_RESOLUTION}; use a lower --refine, or bake a volume along the world's axes"
+        )
+    return counts
 
 
 def blend(coefficients: np.ndarray, nodes: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -11,6 +11,9 @@ Seven blocks of texels are stacked along Z, nz + 2 slices each, the first and la
       …                               c = radiance, orthonormal: three.js applies the cosine lobe itself
       6    c8r  c8g  c8b   0
 
+Against leaks three.js interpolates half a cell along the normal from the surface; ``refine`` makes cells smaller and so
+brings it to the surface, where ``eval`` looks.
+
 From r187 on a grid's box holds one cell around every probe, before that it ended at the outermost probes; the file
 states both.
 """
@@ -41,7 +44,7 @@ _VIEWER = Path(__file__).parent / "three_viewer"
 
 
 def write(job) -> dict:
-    lattice = job.straightened(*axis_aligned(job.lattice))
+    lattice = job.straightened(*axis_aligned(job.lattice, job.options.refine))
     grid = lattice.grid
     texels = atlas(lattice.coefficients, grid.resolution)
     job.path(".bin").write_bytes(job.encode(texels).astype(f"<f{2 if job.encode.precision == 'half' else 4}").tobytes())

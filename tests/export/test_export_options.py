@@ -93,6 +93,8 @@ def test_windows_that_make_no_sense(window):
         {"gain": float("inf")},
         {"size": 0},
         {"size": 5000},
+        {"refine": 0},
+        {"refine": 17},
         {"precision": "double"},
         {"inactive": "drop"},
         {"layout": "ball"},

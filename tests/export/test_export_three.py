@@ -106,6 +106,28 @@ def test_the_stated_cost_of_laying_straight_is_true(tmp_path):
     assert 0.5 < measured / stated < 1.5, (measured, stated)
 
 
+@pytest.mark.parametrize("refine", [2, 3, 8])
+@pytest.mark.parametrize("placement", STRAIGHT)
+def test_refined_it_looks_closer_to_the_surface(tmp_path, placement, refine):
+    """The same trilinear light, and as far beyond the outermost probes, from a shorter way along the normal."""
+    matrix, resolution = PLACEMENTS[placement]
+    field = lit_field(matrix, (*resolution[:2], 1) if refine == 3 else resolution, linear=False)
+    _result, coarse = exported(field, tmp_path / "coarse", precision="float")
+    result, probes = exported(field, tmp_path / "fine", precision="float", refine=refine)
+    assert result.conventions["resampled"] is None
+    many = coarse.resolution > 1
+    np.testing.assert_allclose(probes.spacing[many], coarse.spacing[many] / refine)
+    assert (probes.low <= coarse.low + 1e-9).all() and (probes.high >= coarse.high - 1e-9).all()
+    assert (probes.high - coarse.high < coarse.spacing / refine).all()
+    points, normals = places_inside(field.grid, 300, share=0.8)
+    looked_at = points + normals @ Y_UP.T * probes.spacing * 0.5 @ Y_UP
+    expected = lookup.irradiance(field, looked_at, normals)
+    found = probes.irradiance(points @ Y_UP.T, normals @ Y_UP.T)
+    inside = (found != 0).any(axis=1)
+    np.testing.assert_allclose(found[inside], expected[inside], rtol=1e-5)
+    assert inside.sum() > 200 or refine == 3
+
+
 def test_bright_sides_are_where_blender_has_them(tmp_path):
     field = lit_field(*PLACEMENTS["straight"])
     _result, probes = exported(field, tmp_path)
