@@ -110,14 +110,17 @@ def bake_steps(
             "they are captured again in every iteration"
         )
     reporter.phase("capture", len(nodes))
-    vote = ShellVote(backend.object_count)
     for index in range(batches.count):
         surfaces = batches.captured(index)
-        vote.add(backend.sightings(surfaces))
         reporter.advance(surfaces.count)
         yield
-    with _timed(result, "capture"):
-        backend.set_shells(vote.shells())
+    with _timed(result, "light"):
+        backend.light.light_new_patches()
+    vote = ShellVote(backend.object_count)
+    for index in range(batches.count):
+        vote.add(backend.sightings(batches.captured(index)))
+        yield
+    backend.set_shells(vote.shells())
     yield from _each_statistics(batches, backend)
     shares = backend.read_shares()
     offset = np.zeros((grid.count, 3), np.float32)
@@ -125,51 +128,42 @@ def bake_steps(
     if moved:
         result.notes.append(f"{moved} probes in or behind walls were moved out, at most half a cell")
         shares = backend.read_shares()
-    with _timed(result, "capture"):
-        inside = inside_solid(shares)
-        if inside.all():
-            result.warnings.append(
-                f"{grid.name}: every probe sees mostly back faces without light; they are baked all the same. Flip the "
-                "normals of what surrounds the volume, or move it out of solid geometry"
-            )
-        else:
-            state[nodes[inside]] = INVALID
-        backend.set_states(state)
+    inside = inside_solid(shares)
+    if inside.all():
+        result.warnings.append(
+            f"{grid.name}: every probe sees mostly back faces without light; they are baked all the same. Flip the "
+            "normals of what surrounds the volume, or move it out of solid geometry"
+        )
+    else:
+        state[nodes[inside]] = INVALID
 
     reporter.phase("light")
+    with _timed(result, "light"):
+        backend.light.connect()
+    result.notes.append(f"light bounces between {backend.light.count} patches of surface")
+    yield
     convergence = Convergence(settings.bounces, settings.tolerance)
-    while True:
-        for index in range(batches.count):
-            with _timed(result, "light"):
-                backend.iterate(batches.lit(index), read_field=convergence.iterations > 0)
-            yield
+    while not convergence.done:
         with _timed(result, "light"):
-            energy, change, overlap, band0 = backend.finish_iteration()
-            result.energy.append(band0 / max(len(nodes), 1) * 0.28209479177387814)
+            energy, change, overlap, luminance = backend.light.iterate(bounce=convergence.iterations > 0)
+            result.energy.append(luminance)
             factor = convergence.add(energy, change, overlap)
             reporter.advance(1)
-            if convergence.done:
-                break
             if factor:
-                backend.extrapolate(factor)
+                backend.light.extrapolate(factor)
         yield
-
-    if settings.gather:
-        reporter.phase("gather", len(nodes))
-        for index in range(batches.count):
-            with _timed(result, "light"):
-                surfaces = batches.lit(index)
-                backend.gather(surfaces)
-                backend.iterate(surfaces, read_field=False)
-                reporter.advance(surfaces.count)
-            yield
+    reporter.phase("gather" if settings.gather else "project", len(nodes))
+    for index in range(batches.count):
+        surfaces = batches.captured(index)
         with _timed(result, "light"):
-            backend.finish_iteration()
+            (backend.gather if settings.gather else backend.project)(surfaces)
+            reporter.advance(surfaces.count)
+        yield
 
     if backend.scene.emitter_count:
         for index in range(batches.count):
             with _timed(result, "light"):
-                backend.add_emission(batches.lit(index))
+                backend.add_emission(batches.captured(index))
             yield
 
     with _timed(result, "light"):
@@ -197,12 +191,11 @@ class _Batches:
         self._backend = backend
         self._method = method
         self._slots = slots
-        self._result = result
+        self.result = result
         self.resident = slots <= backend.probes_in_budget
         self._size = min(backend.probes_per_batch, slots)
         self.count = -(-slots // self._size)
         self._kept: dict[int, Surfaces] = {}
-        self._weighed: set[int] = set()
 
     def range(self, index: int) -> tuple[int, int]:
         """First slot and number of slots of batch ``index``."""
@@ -215,17 +208,16 @@ class _Batches:
         return slots[(slots >= first) & (slots < first + count)]
 
     def captured(self, index: int) -> Surfaces:
-        """Batch ``index`` with geometry, albedo, emission and source, before it knows where it reads the field."""
-        if index in self._kept and index not in self._weighed:
+        """Batch ``index`` with geometry, albedo, emission and the patches that texels lie on."""
+        if index in self._kept:
             return self._kept[index]
         if not self.resident:
             self._kept.clear()  # frees the images of the batch before
-            self._weighed.clear()
-        with _timed(self._result, "capture"):
+        with _timed(self.result, "capture"):
             surfaces = self._kept[index] = self._backend.surfaces(*self.range(index))
             self._backend.capture(surfaces, self._method)
-        with _timed(self._result, "light"):
-            self._backend.direct_light(surfaces)
+        with _timed(self.result, "light"):
+            self._backend.bind(surfaces)
         return surfaces
 
     def capture_again(self, index: int, slots: np.ndarray) -> Surfaces:
@@ -233,19 +225,10 @@ class _Batches:
         surfaces = self.captured(index)
         layers = slots - surfaces.first
         for run in np.split(layers, np.flatnonzero(np.diff(layers) > 1) + 1):
-            with _timed(self._result, "capture"):
+            with _timed(self.result, "capture"):
                 self._backend.capture(surfaces, self._method, int(run[0]), len(run))
-            with _timed(self._result, "light"):
-                self._backend.direct_light(surfaces, int(run[0]), len(run))
-        return surfaces
-
-    def lit(self, index: int) -> Surfaces:
-        """Batch ``index`` ready for light iterations."""
-        if index in self._weighed and index in self._kept:
-            return self._kept[index]
-        surfaces = self.captured(index)
-        self._backend.weigh_lookups(surfaces)
-        self._weighed.add(index)
+            with _timed(self.result, "light"):
+                self._backend.bind(surfaces, int(run[0]), len(run))
         return surfaces
 
 
@@ -283,7 +266,13 @@ def _relocate(
         for index in range(batches.count):
             slots = batches.slots_of(index, changed)
             if len(slots):
-                backend.statistics(batches.capture_again(index, slots))
+                batches.capture_again(index, slots)
+            yield
+        with _timed(batches.result, "light"):
+            backend.light.light_new_patches()
+        for index in range(batches.count):
+            if len(batches.slots_of(index, changed)):
+                backend.statistics(batches.captured(index))
             yield
     offset[nodes] = step
     return int(step.any(axis=1).sum())
@@ -311,7 +300,8 @@ def _finish(
     baked.state[:] = state
     baked.validity[nodes] = 1.0 - shares[:, 0]
     baked.offset[:] = offset
-    baked.coefficients = dilation.fill(grid, backend.read_field(), state == ACTIVE)
+    baked.coefficients[nodes] = backend.read_field()
+    baked.coefficients = dilation.fill(grid, baked.coefficients, state == ACTIVE)
     baked.depth[nodes] = backend.read_depth()
     return baked
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .conventions import FACE_FORWARD, FACE_RIGHT, FACE_UP
+from .conventions import CUBE_TURN, FACE_FORWARD, FACE_RIGHT, FACE_UP
 
 
 def _corner_integral(s: np.ndarray, t: np.ndarray) -> np.ndarray:
@@ -50,9 +50,10 @@ def texel_solid_angles(face: int) -> np.ndarray:
 def direction_to_texel(directions: np.ndarray, face: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(face index, row, column) of the texel that each of ``directions`` (…, 3) falls into."""
     directions = np.asarray(directions, float)
-    magnitude = np.abs(directions)
+    in_cube = directions @ CUBE_TURN
+    magnitude = np.abs(in_cube)
     axis = np.argmax(magnitude, axis=-1)
-    negative = np.take_along_axis(directions, axis[..., None], -1)[..., 0] < 0
+    negative = np.take_along_axis(in_cube, axis[..., None], -1)[..., 0] < 0
     index = 2 * axis + negative
     depth = np.take_along_axis(magnitude, axis[..., None], -1)[..., 0]
     s = np.einsum("...i,...i->...", directions, FACE_RIGHT[index]) / depth
@@ -86,3 +87,19 @@ def octahedral_encode(directions: np.ndarray) -> np.ndarray:
     folded_y = np.copysign(1.0 - np.abs(x), y)
     below = z < 0
     return np.stack([np.where(below, folded_x, x), np.where(below, folded_y, y)], axis=-1)
+
+
+_NORMAL_STEPS = 2047.0
+
+
+def pack_normal(uv: np.ndarray) -> np.ndarray:
+    """Octahedral normals (…, 2) as one whole number each, which float32 holds exactly. Main axes survive exactly."""
+    steps = np.rint(np.clip(uv, -1.0, 1.0) * _NORMAL_STEPS) + 2048.0
+    return steps[..., 0] + 4096.0 * steps[..., 1]
+
+
+def unpack_normal(packed: np.ndarray) -> np.ndarray:
+    """(…, 3) unit normals."""
+    high = np.floor(packed / 4096.0)
+    uv = np.stack([packed - 4096.0 * high, high], axis=-1)
+    return octahedral_decode((uv - 2048.0) / _NORMAL_STEPS)

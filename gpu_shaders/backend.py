@@ -13,32 +13,31 @@ import gpu
 import numpy as np
 
 from ..core import lookup
-from ..core.conventions import CULLED, DEPTH_EDGE
+from ..core.conventions import DEPTH_EDGE
 from ..core.cubemap import texel_solid_angles
-from ..core.dilation import nearest_active
 from ..core.emitters import sampling_density
 from ..core.grid import Grid
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..core.world_map import world_texels
+from .patch_light import PatchLight, gather_rays
 from .programs import program
 from .raster_capture import RasterCapture
 from .scene_textures import SceneTextures
 from .textures import allocate, layers, read, upload
 
 _GROUP = 64  # threads that share a probe where its texels are summed
-_EMITTER_SAMPLES = 1024  # points on emitters that each probe looks at besides its texels
+_EMITTER_POINTS = 8192  # that each probe considers besides its texels
+_EMITTER_RAYS = 512  # that it sends to them
 # Kept images of texel surfaces. Albedo is 32 bit: in a bright room an error of 1e-4 in 0.99 is one of 1e-2 in the
 # light.
 _SURFACE_FORMATS = {
     "geometry": "RGBA32F",
     "albedo": "RGBA32F",
     "emission": "RGBA32F",
-    "source": "RGBA32F",
-    "weights0": "RGBA16F",
-    "weights1": "RGBA16F",
 }
-BYTES_PER_TEXEL = sum(16 if pixel == "RGBA32F" else 8 for pixel in _SURFACE_FORMATS.values())
+BYTES_PER_TEXEL = 16 * len(_SURFACE_FORMATS)
+_GATHER_RAYS = 1 << 20  # at once
 _HIT_BYTES = 20  # hit record and depth, which exist during capture only
 
 
@@ -76,7 +75,7 @@ class GpuBackend:
         background = np.zeros((6 * self.face**2, 4), np.float32)
         background[:, :3] = world_texels(snapshot.world, self.face).reshape(-1, 3)
         self._world_texels = upload(background, "texels")
-        self._change = gpu.types.GPUTexture((1, 1), format="RGBA32F")
+        self.light = PatchLight(self.scene, grid, settings, self._world_texels)
         layer_limit = gpu.capabilities.max_texture_layers_get()
         texels = 6 * self.face**2
         budget = settings.memory_mib << 20
@@ -99,31 +98,10 @@ class GpuBackend:
         self._probe_slots = upload(slots, "probes")
 
     def allocate_field(self) -> None:
-        """The field of the last three iterations, newest first, and the statistics of the active probes, all zero."""
-        elements = self.grid.count * self.coefficients
-        self._field = [allocate(elements, "field coefficients") for _ in range(3)]
+        """Field and statistics of the active probes, all zero."""
+        self._field = allocate(len(self._nodes) * self.coefficients, "field coefficients")
         self._moments = allocate(len(self._nodes) * DEPTH_EDGE**2, "depth statistics", "RG32F")
         self._shares = allocate(len(self._nodes), "probes")
-
-    def set_states(self, state: np.ndarray) -> None:
-        """Makes probe states (P,) known to lookups; call after statistics, before lookup weights."""
-        nodes = np.full((self.grid.count, 4), -2.0, np.float32)
-        nodes[state == CULLED, 3] = -1.0
-        nodes[:, :3] = self.grid.positions() - self.grid.center
-        nodes[self._nodes, :3] = self._positions
-        slot_is_active = state[self._nodes] == 1
-        nodes[self._nodes[slot_is_active], 3] = np.flatnonzero(slot_is_active)
-        self._grid_nodes = upload(nodes, "grid nodes")
-        active = np.zeros(self.grid.count, bool)
-        active[self._nodes[slot_is_active]] = True
-        inactive = np.flatnonzero(~active)
-        pairs = np.zeros((len(inactive), 4), np.float32)
-        if active.any():
-            pairs[:, 0], pairs[:, 1] = inactive, nearest_active(self.grid, active)[inactive]
-        self._inactive = upload(pairs, "inactive nodes") if len(inactive) and active.any() else None
-        self._inactive_count = len(inactive)
-        info = lookup.grid_info(self.grid)
-        self._grid_info = gpu.types.GPUUniformBuf(gpu.types.Buffer("FLOAT", info.size, info.reshape(-1)))
 
     # Capture
     # ----------------------------------------------------------------------------------------------------------------
@@ -178,10 +156,11 @@ class GpuBackend:
         self._dispatch_texels(shader, count)
 
     def sightings(self, surfaces: Surfaces) -> np.ndarray:
-        """(count, 384): which objects each probe sees, see core/orientation.py. Needs captured surfaces with source."""
+        """(count, 384): which objects each probe sees, see core/orientation.py. Needs direct light."""
         shader = program("object_sightings_comp", FACE=self.face)
         result = allocate(surfaces.count * 96, "sightings")
-        for name in ("geometry", "emission", "source"):
+        shader.uniform_sampler("patch_irradiance", self.light.direct)
+        for name in ("geometry", "albedo", "emission"):
             shader.uniform_sampler(name, surfaces.textures[name])
         shader.image("sightings", result)
         gpu.compute.dispatch(shader, surfaces.count, 1, 1)
@@ -206,12 +185,12 @@ class GpuBackend:
         return read(result, len(layers_) * 6).reshape(-1, 6, 4)
 
     def statistics(self, surfaces: Surfaces) -> None:
-        """Depth moments and what the probes see as a whole. Needs captured surfaces with source and without lookup
-        weights."""
+        """Depth moments and what the probes see as a whole. Needs direct light."""
         shader = program("probe_statistics_comp", FACE=self.face)
         shader.uniform_sampler("texel_weights", self._texel_weights)
         shader.uniform_sampler("shells", self._shells)
-        for name in ("geometry", "emission", "source"):
+        shader.uniform_sampler("patch_irradiance", self.light.direct)
+        for name in ("geometry", "albedo", "emission"):
             shader.uniform_sampler(name, surfaces.textures[name])
         shader.image("depth_moments", self._moments)
         shader.image("probe_shares", self._shares)
@@ -232,62 +211,76 @@ class GpuBackend:
     # Light
     # ------------------------------------------------------------------------------------------------------------------
 
-    def weigh_lookups(self, surfaces: Surfaces) -> None:
-        """Where every texel surface reads the field: weights and first node."""
-        shader = program("lookup_weights_comp", FACE=self.face)
-        shader.uniform_block("grid_info", self._grid_info)
-        shader.uniform_sampler("grid_nodes", self._grid_nodes)
-        shader.uniform_sampler("depth_moments", self._moments)
-        shader.uniform_sampler("probe_slots", self._probe_slots)
-        for name in ("geometry", "weights0", "weights1"):
-            shader.image(name, surfaces.textures[name])
-        self._set_range(shader, surfaces)
-        self._dispatch_texels(shader, surfaces.count)
-
-    def direct_light(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> None:
-        """Fills source: reflected direct light of lamps and sampled emitters, and emission as far as the field carries
-        it; of all or of ``count`` probes from ``start``."""
-        shader = program("direct_light_comp", FACE=self.face, **self.scene.light_defines)
-        self.scene.bind_lights(shader)
-        shader.uniform_sampler("probe_slots", self._probe_slots)
-        for name in ("geometry", "albedo", "emission"):
-            shader.uniform_sampler(name, surfaces.textures[name])
-        shader.image("source", surfaces.textures["source"])
+    def bind(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> None:
+        """Finds the patches on which the texels of all or of ``count`` probes from ``start`` lie."""
         count = surfaces.count if count is None else count
+        first = surfaces.first + start
+        patches = self.light.bind_texels(self._texel_hits(surfaces, start, count), self._positions[first : first + count])
+        self._note_patches(surfaces, start, count, patches)
+
+    def _texel_hits(self, surfaces: Surfaces, start: int, count: int) -> gpu.types.GPUTexture:
+        """Where texels meet surface, as one linear array."""
+        shader = program("texel_hits_comp", FACE=self.face)
+        hits = allocate(count * 6 * self.face**2, "texels")
+        shader.uniform_sampler("probe_slots", self._probe_slots)
+        for name in ("geometry", "albedo"):
+            shader.uniform_sampler(name, surfaces.textures[name])
+        shader.image("hits", hits)
         shader.uniform_int("first_slot", (surfaces.first + start,))
         shader.uniform_int("first_layer", (start,))
-        shader.uniform_int("samples", (self.settings.samples,))
-        shader.uniform_int("seed", (self.settings.seed,))
+        self._dispatch_texels(shader, count)
+        return hits
+
+    def _note_patches(self, surfaces: Surfaces, start: int, count: int, patches: gpu.types.GPUTexture) -> None:
+        """Stores with each texel where its irradiance stands."""
+        shader = program("texel_patches_comp", FACE=self.face)
+        shader.uniform_sampler("patches", patches)
+        shader.image("albedo", surfaces.textures["albedo"])
+        shader.uniform_int("first_layer", (start,))
         self._dispatch_texels(shader, count)
 
-    def iterate(self, surfaces: Surfaces, read_field: bool) -> None:
-        """One light iteration of these probes: reads the newest field and writes over the oldest."""
+    def project(self, surfaces: Surfaces) -> None:
+        """The field of these probes: what their texels send by the light of their patches."""
+        self._project(surfaces, 0, surfaces.count, self.light.irradiance)
+
+    def gather(self, surfaces: Surfaces) -> None:
+        """The field of these probes by a final gather: every texel with light and paths of its own."""
+        texels = 6 * self.face**2
+        at_once = max(1, _GATHER_RAYS // (texels * gather_rays(self.settings.samples)))
+        for start in range(0, surfaces.count, at_once):
+            count = min(at_once, surfaces.count - start)
+            first_key = (surfaces.first + start) * texels
+            irradiance = self.light.gather(self._texel_hits(surfaces, start, count), count * texels, first_key)
+            own = upload(np.arange(count * texels).reshape(-1, 4), "texels")
+            self._note_patches(surfaces, start, count, own)
+            self._project(surfaces, start, count, irradiance)
+
+    def _project(self, surfaces: Surfaces, start: int, count: int, irradiance: gpu.types.GPUTexture) -> None:
         shader = program(
-            "light_iterate_comp",
+            "field_project_comp",
             FACE=self.face,
             BANDS=self.settings.bands,
             COEFFICIENTS=self.coefficients,
             GROUP=_GROUP,
         )
-        shader.uniform_block("grid_info", self._grid_info)
-        shader.uniform_sampler("probe_slots", self._probe_slots)
         shader.uniform_sampler("texel_weights", self._texel_weights)
-        shader.uniform_sampler("field_in", self._field[0])
-        for name in ("geometry", "albedo", "source", "weights0", "weights1"):
+        shader.uniform_sampler("patch_irradiance", irradiance)
+        for name in ("albedo", "emission"):
             shader.uniform_sampler(name, surfaces.textures[name])
-        shader.image("field_out", self._field[-1])
-        self._set_range(shader, surfaces)
-        shader.uniform_int("read_field", (int(read_field),))
-        gpu.compute.dispatch(shader, surfaces.count, 1, 1)
+        shader.image("field", self._field)
+        shader.uniform_int("first_slot", (surfaces.first + start,))
+        shader.uniform_int("first_layer", (start,))
+        gpu.compute.dispatch(shader, count, 1, 1)
 
     def add_emission(self, surfaces: Surfaces) -> None:
-        """Adds what these probes see of sampled emitters to the newest field."""
+        """Adds what these probes see of sampled emitters to the field."""
         shader = program(
             "emission_project_comp",
             FACE=self.face,
             BANDS=self.settings.bands,
             COEFFICIENTS=self.coefficients,
             GROUP=_GROUP,
+            CANDIDATE_COUNT=_EMITTER_POINTS,
             **self.scene.light_defines,
         )
         self.scene.bind_surfaces(shader)
@@ -296,79 +289,16 @@ class GpuBackend:
         shader.uniform_sampler("texel_weights", self._texel_weights)
         for name in ("geometry", "emission"):
             shader.uniform_sampler(name, surfaces.textures[name])
-        shader.image("field", self._field[0])
+        shader.image("field", self._field)
         self._set_range(shader, surfaces)
-        shader.uniform_int("samples", (_EMITTER_SAMPLES,))
+        shader.uniform_int("samples", (_EMITTER_RAYS,))
         shader.uniform_int("seed", (self.settings.seed,))
         gpu.compute.dispatch(shader, surfaces.count, 1, 1)
 
-    def gather(self, surfaces: Surfaces) -> None:
-        """Adds to source what really traced bounces bring; afterwards iterate without reading the field."""
-        shader = program(
-            "gather_comp",
-            FACE=self.face,
-            BANDS=self.settings.bands,
-            COEFFICIENTS=self.coefficients,
-            **(self.scene.surface_defines | self.scene.light_defines | {"HAS_IMAGES": self.scene.has_images}),
-        )
-        self.scene.bind_surfaces(shader)
-        self.scene.bind_lights(shader)
-        shader.uniform_block("grid_info", self._grid_info)
-        for name, texture in (
-            ("grid_nodes", self._grid_nodes),
-            ("depth_moments", self._moments),
-            ("field_in", self._field[0]),
-            ("world_texels", self._world_texels),
-            ("probe_slots", self._probe_slots),
-        ):
-            shader.uniform_sampler(name, texture)
-        for name in ("geometry", "albedo"):
-            shader.uniform_sampler(name, surfaces.textures[name])
-        shader.image("source", surfaces.textures["source"])
-        self._set_range(shader, surfaces)
-        for name, value in (
-            ("samples", self.settings.samples),
-            ("bounces", self.settings.gather),
-            ("seed", self.settings.seed),
-        ):
-            shader.uniform_int(name, (value,))
-        self._dispatch_texels(shader, surfaces.count)
-
-    def finish_iteration(self) -> tuple[float, float, float, float]:
-        """Fills inactive nodes and makes the field just written the newest.
-
-        Returns sums over active probes: |field|², |change|², change · change before, luminance of band 0.
-        """
-        self._field.insert(0, self._field.pop())
-        if self._inactive is not None:
-            shader = program("field_fill_comp", COEFFICIENTS=self.coefficients)
-            shader.uniform_sampler("inactive_nodes", self._inactive)
-            shader.image("field", self._field[0])
-            shader.uniform_int("inactive_count", (self._inactive_count,))
-            gpu.compute.dispatch(shader, -(-self._inactive_count * self.coefficients // 64), 1, 1)
-        shader = program("field_change_comp", COEFFICIENTS=self.coefficients)
-        shader.uniform_sampler("probe_slots", self._probe_slots)
-        for name, texture in zip(("field_new", "field_old", "field_older"), self._field):
-            shader.uniform_sampler(name, texture)
-        shader.image("change", self._change)
-        shader.uniform_int("slot_count", (len(self._nodes),))
-        gpu.compute.dispatch(shader, 1, 1, 1)
-        return tuple(read(self._change, 1)[0].tolist())
-
-    def extrapolate(self, factor: float) -> None:
-        """field += factor · (field − field of the iteration before)."""
-        shader = program("field_extrapolate_comp", COEFFICIENTS=self.coefficients)
-        shader.uniform_sampler("field_old", self._field[1])
-        shader.image("field", self._field[0])
-        elements = self.grid.count * self.coefficients
-        shader.uniform_int("element_count", (elements,))
-        shader.uniform_float("factor", factor)
-        gpu.compute.dispatch(shader, -(-elements // 64), 1, 1)
-
     def read_field(self) -> np.ndarray:
-        """(P, coefficients, 3) float32 copy of the current field."""
-        values = read(self._field[0], self.grid.count * self.coefficients)
-        return np.ascontiguousarray(values[:, :3].reshape(self.grid.count, self.coefficients, 3))
+        """(slots, coefficients, 3) float32 copy of the field."""
+        values = read(self._field, len(self._nodes) * self.coefficients)
+        return np.ascontiguousarray(values[:, :3].reshape(len(self._nodes), self.coefficients, 3))
 
     # Dispatch
     # ---------------------------------------------------------------------------------------------------------------

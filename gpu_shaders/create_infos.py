@@ -57,7 +57,7 @@ def capture_trace_comp(info, defines):
     _image(info, 0, "hits", layered=True)
     _ints(info, "first_slot")
     info.local_group_size(8, 8, 1)
-    return {"compute": ["data_lib", "cubemap_lib", *_surface_files(defines), "ray_lib", "capture_trace_comp"]}
+    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *_surface_files(defines), "ray_lib", "capture_trace_comp"]}
 
 
 def capture_raster(info, defines):
@@ -77,7 +77,7 @@ def capture_raster(info, defines):
     info.depth_write("ANY")
     info.fragment_out(0, "VEC4", "hit")
     return {
-        "vertex": ["data_lib", "cubemap_lib", "capture_raster_vert"],
+        "vertex": ["data_lib", "octahedral_lib", "cubemap_lib", "capture_raster_vert"],
         "fragment": ["data_lib", *_surface_files(defines), "capture_raster_frag"],
     }
 
@@ -92,15 +92,16 @@ def surface_resolve_comp(info, defines):
     _image(info, 2, "emission", layered=True)
     _ints(info, "first_slot", "first_layer")
     info.local_group_size(8, 8, 1)
-    return {"compute": ["data_lib", "cubemap_lib", "surface_lib", "surface_resolve_comp"]}
+    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", "surface_lib", "surface_resolve_comp"]}
 
 
 def object_sightings_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
-    _samplers(info, "geometry", "emission", "source", kind="FLOAT_2D_ARRAY")
+    slot = _samplers(info, "patch_irradiance")
+    _samplers(info, "geometry", "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "sightings")
     info.local_group_size(96, 1, 1)
-    return {"compute": ["data_lib", "object_sightings_comp"]}
+    return {"compute": ["data_lib", "texel_light_lib", "object_sightings_comp"]}
 
 
 def probe_exits_comp(info, defines):
@@ -109,32 +110,20 @@ def probe_exits_comp(info, defines):
     _samplers(info, "geometry", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "exits")
     info.local_group_size(6, 1, 1)
-    return {"compute": ["data_lib", "cubemap_lib", "probe_exits_comp"]}
+    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", "probe_exits_comp"]}
 
 
 def probe_statistics_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
     info.define("DEPTH_EDGE", str(DEPTH_EDGE))
-    slot = _samplers(info, "texel_weights", "shells")
-    _samplers(info, "geometry", "emission", "source", kind="FLOAT_2D_ARRAY", first=slot)
+    slot = _samplers(info, "texel_weights", "shells", "patch_irradiance")
+    _samplers(info, "geometry", "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "depth_moments", pixel="RG32F")
     _image(info, 1, "probe_shares")
     _ints(info, "first_slot", "first_layer")
     info.push_constant("FLOAT", "depth_clamp")
     info.local_group_size(DEPTH_EDGE * DEPTH_EDGE, 1, 1)
-    return {"compute": ["data_lib", "cubemap_lib", "probe_statistics_comp"]}
-
-
-def lookup_weights_comp(info, defines):
-    info.define("NO_SURFACE", NO_SURFACE)
-    slot = _lookup(info, 0)
-    _samplers(info, "probe_slots", first=slot)
-    _image(info, 0, "geometry", layered=True, access="READ+WRITE")
-    _image(info, 1, "weights0", layered=True, pixel="RGBA16F")
-    _image(info, 2, "weights1", layered=True, pixel="RGBA16F")
-    _ints(info, "first_slot", "first_layer")
-    info.local_group_size(8, 8, 1)
-    return {"compute": ["data_lib", "cubemap_lib", "lookup_lib", "lookup_weights_comp"]}
+    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", "texel_light_lib", "probe_statistics_comp"]}
 
 
 def _emitters(info, defines: dict, first: int) -> int:
@@ -153,16 +142,121 @@ def _light_files(defines: dict) -> list[str]:
     return ["random_lib", *surfaces, "ray_lib", "direct_light_lib", *emitters]
 
 
-def direct_light_comp(info, defines):
+def field_project_comp(info, defines):
+    slot = _samplers(info, "texel_weights", "patch_irradiance")
+    _samplers(info, "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)
+    _image(info, 0, "field")
+    _ints(info, "first_slot", "first_layer")
+    info.local_group_size(int(defines["GROUP"]), 1, 1)
+    return {
+        "compute": ["data_lib", "octahedral_lib", "cubemap_lib", "spherical_harmonics_lib", "texel_light_lib", "field_project_comp"]
+    }
+
+
+def texel_hits_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
+    slot = _samplers(info, "probe_slots")
+    _samplers(info, "geometry", "albedo", kind="FLOAT_2D_ARRAY", first=slot)
+    _image(info, 0, "hits")
+    _ints(info, "first_slot", "first_layer")
+    info.local_group_size(8, 8, 1)
+    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", "texel_hits_comp"]}
+
+
+def texel_patches_comp(info, defines):
+    _samplers(info, "patches")
+    _image(info, 0, "albedo", layered=True, access="READ+WRITE")
+    _ints(info, "first_layer")
+    info.local_group_size(8, 8, 1)
+    return {"compute": ["data_lib", "texel_patches_comp"]}
+
+
+def patch_visible_comp(info, defines):
+    slot = _scene(info, defines, attributes=False)
+    _samplers(info, "hits", "pairs", "patch_points", first=slot)
+    _image(info, 0, "visible", pixel="R32F")
+    _ints(info, "pair_count")
+    info.local_group_size(64, 1, 1)
+    return {
+        "compute": ["data_lib", "octahedral_lib", *_surface_files(defines), "ray_lib", "patch_visible_comp"]
+    }
+
+
+def patch_spread_comp(info, defines):
     slot = _scene(info, defines, attributes="HAS_EMITTERS" in defines)
     slot = _emitters(info, defines, slot)
-    slot = _samplers(info, "lights", "probe_slots", first=slot)
-    _samplers(info, "geometry", "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)
-    _image(info, 0, "source", layered=True)
-    _ints(info, "first_slot", "first_layer", "light_count", "samples", "seed")
-    info.local_group_size(8, 8, 1)
-    return {"compute": ["data_lib", "cubemap_lib", *_light_files(defines), "direct_light_comp"]}
+    _samplers(info, "lights", "patch_points", first=slot)
+    _image(info, 0, "spread")
+    _ints(info, "first_patch", "patch_count", "light_count", "seed")
+    info.local_group_size(64, 1, 1)
+    return {"compute": ["data_lib", "octahedral_lib", *_light_files(defines), "patch_spread_comp"]}
+
+
+def patch_direct_comp(info, defines):
+    slot = _scene(info, defines, attributes="HAS_EMITTERS" in defines)
+    slot = _emitters(info, defines, slot)
+    _samplers(info, "lights", "patches", "patch_points", first=slot)
+    _image(info, 0, "direct")
+    _ints(info, "patch_count", "first_key", "light_count", "samples", "seed")
+    info.local_group_size(64, 1, 1)
+    return {"compute": ["data_lib", "octahedral_lib", *_light_files(defines), "patch_direct_comp"]}
+
+
+def patch_rays_comp(info, defines):
+    is_path = int(defines["SEGMENTS"]) > 1
+    slot = _scene(info, defines)
+    if is_path:
+        slot = _emitters(info, defines, slot)
+        _ints(info, "light_count")
+        slot = _samplers(info, "lights", first=slot)
+    _samplers(info, "patch_points", "world_texels", first=slot)
+    _image(info, 0, "hits")
+    _image(info, 1, "carried")
+    _image(info, 2, "reflected")
+    _ints(info, "first_ray", "ray_count", "first_key", "seed")
+    info.local_group_size(64, 1, 1)
+    return {
+        "compute": [
+            "data_lib",
+            "octahedral_lib",
+            "cubemap_lib",
+            *(_light_files(defines | {"HAS_ALPHA": True}) if is_path else ("random_lib", "surface_lib", "ray_lib")),
+            "patch_rays_comp",
+        ]
+    }
+
+
+def patch_carried_comp(info, defines):
+    _samplers(info, "carried")
+    _image(info, 0, "brought")
+    _ints(info, "first_patch", "patch_count")
+    info.local_group_size(64, 1, 1)
+    return {"compute": ["data_lib", "patch_carried_comp"]}
+
+
+def patch_iterate_comp(info, defines):
+    _samplers(info, "direct", "brought", "reflected", "ray_ends", "irradiance_in")
+    _image(info, 0, "irradiance_out")
+    _ints(info, "patch_count", "bounce")
+    info.local_group_size(64, 1, 1)
+    return {"compute": ["data_lib", "patch_iterate_comp"]}
+
+
+def patch_change_comp(info, defines):
+    _samplers(info, "irradiance_new", "irradiance_old", "irradiance_older", "patch_seen")
+    _image(info, 0, "change")
+    _ints(info, "patch_count")
+    info.local_group_size(256, 1, 1)
+    return {"compute": ["data_lib", "patch_change_comp"]}
+
+
+def patch_extrapolate_comp(info, defines):
+    _samplers(info, "irradiance_old")
+    _image(info, 0, "irradiance", access="READ+WRITE")
+    _ints(info, "patch_count")
+    info.push_constant("FLOAT", "factor")
+    info.local_group_size(64, 1, 1)
+    return {"compute": ["data_lib", "patch_extrapolate_comp"]}
 
 
 def emission_project_comp(info, defines):
@@ -176,6 +270,7 @@ def emission_project_comp(info, defines):
     return {
         "compute": [
             "data_lib",
+            "octahedral_lib",
             "cubemap_lib",
             "spherical_harmonics_lib",
             *_light_files(defines),
@@ -184,84 +279,3 @@ def emission_project_comp(info, defines):
     }
 
 
-def light_iterate_comp(info, defines):
-    info.uniform_buf(0, "vec4", "grid_info[5]")
-    slot = _samplers(info, "probe_slots", "texel_weights", "field_in")
-    _samplers(info, "geometry", "albedo", "source", "weights0", "weights1", kind="FLOAT_2D_ARRAY", first=slot)
-    _image(info, 0, "field_out")
-    _ints(info, "first_slot", "first_layer", "read_field")
-    info.local_group_size(int(defines["GROUP"]), 1, 1)
-    return {"compute": ["data_lib", "cubemap_lib", "spherical_harmonics_lib", "field_lib", "light_iterate_comp"]}
-
-
-def field_fill_comp(info, defines):
-    _samplers(info, "inactive_nodes")
-    _image(info, 0, "field", access="READ+WRITE")
-    _ints(info, "inactive_count")
-    info.local_group_size(64, 1, 1)
-    return {"compute": ["data_lib", "field_fill_comp"]}
-
-
-def field_change_comp(info, defines):
-    _samplers(info, "probe_slots", "field_new", "field_old", "field_older")
-    _image(info, 0, "change")
-    _ints(info, "slot_count")
-    info.local_group_size(256, 1, 1)
-    return {"compute": ["data_lib", "field_change_comp"]}
-
-
-def field_extrapolate_comp(info, defines):
-    _samplers(info, "field_old")
-    _image(info, 0, "field", access="READ+WRITE")
-    _ints(info, "element_count")
-    info.push_constant("FLOAT", "factor")
-    info.local_group_size(64, 1, 1)
-    return {"compute": ["data_lib", "field_extrapolate_comp"]}
-
-
-def preview_comp(info, defines):
-    slot = _scene(info, defines)
-    slot = _lookup(info, slot)
-    _samplers(info, "lights", "field_in", "world_texels", "spheres", first=slot)
-    _image(info, 0, "picture", access="READ+WRITE")
-    _image(info, 1, "probe_picture", access="READ+WRITE")
-    info.uniform_buf(1, "vec4", "view_info[5]")
-    _ints(info, "light_count", "sample_index", "show_direct")
-    info.local_group_size(8, 8, 1)
-    return {
-        "compute": [
-            "data_lib",
-            "cubemap_lib",
-            "random_lib",
-            "spherical_harmonics_lib",
-            "surface_lib",
-            "ray_lib",
-            "direct_light_lib",
-            "lookup_lib",
-            "field_lib",
-            "preview_comp",
-        ]
-    }
-
-
-def gather_comp(info, defines):
-    info.define("NO_SURFACE", NO_SURFACE)
-    slot = _scene(info, defines)
-    slot = _emitters(info, defines, slot)
-    slot = _lookup(info, slot)
-    slot = _samplers(info, "lights", "field_in", "world_texels", "probe_slots", first=slot)
-    _samplers(info, "geometry", "albedo", kind="FLOAT_2D_ARRAY", first=slot)
-    _image(info, 0, "source", layered=True, access="READ+WRITE")
-    _ints(info, "first_slot", "first_layer", "light_count", "samples", "bounces", "seed")
-    info.local_group_size(8, 8, 1)
-    return {
-        "compute": [
-            "data_lib",
-            "cubemap_lib",
-            "spherical_harmonics_lib",
-            *_light_files(defines | {"HAS_ALPHA": True}),
-            "lookup_lib",
-            "field_lib",
-            "gather_comp",
-        ]
-    }

@@ -1,18 +1,21 @@
-/* Cubemap texels and the octahedral map. Reference: core/cubemap.py; the faces are drawn in core/conventions.py.
+/* Cubemap texels. Reference: core/cubemap.py; the faces are drawn in core/conventions.py.
  *
  * The surfaces of a probe are one layer, FACE wide and 6·FACE high: x = column, y = face·FACE + row.
  */
+
+/* from the cube's frame to the world; why: core/conventions.py */
+const mat3 CUBE_TURN = mat3(72.0, 48.0, -46.0, -24.0, 82.0, 48.0, 62.0, -24.0, 72.0) / 98.0;
 
 vec3 face_direction(int face, vec2 st)
 {
   /* forward + s·right + t·up, not normalised */
   switch (face) {
-    case 0: return vec3(1.0, -st.x, st.y);
-    case 1: return vec3(-1.0, st.x, st.y);
-    case 2: return vec3(st.x, 1.0, st.y);
-    case 3: return vec3(-st.x, -1.0, st.y);
-    case 4: return vec3(st.x, -st.y, 1.0);
-    default: return vec3(st.x, st.y, -1.0);
+    case 0: return CUBE_TURN * vec3(1.0, -st.x, st.y);
+    case 1: return CUBE_TURN * vec3(-1.0, st.x, st.y);
+    case 2: return CUBE_TURN * vec3(st.x, 1.0, st.y);
+    case 3: return CUBE_TURN * vec3(-st.x, -1.0, st.y);
+    case 4: return CUBE_TURN * vec3(st.x, -st.y, 1.0);
+    default: return CUBE_TURN * vec3(st.x, st.y, -1.0);
   }
 }
 
@@ -31,6 +34,7 @@ vec3 texel_direction(ivec2 texel)
 
 ivec2 direction_texel(vec3 direction)
 {
+  direction = direction * CUBE_TURN; /* by the transposed matrix */
   vec3 size = abs(direction);
   int face;
   vec2 st;
@@ -48,23 +52,4 @@ ivec2 direction_texel(vec3 direction)
   }
   ivec2 texel = clamp(ivec2((st * 0.5 + 0.5) * float(FACE)), ivec2(0), ivec2(FACE - 1));
   return ivec2(texel.x, face * FACE + texel.y);
-}
-
-vec3 octahedral_decode(vec2 uv)
-{
-  vec3 direction = vec3(uv, 1.0 - abs(uv.x) - abs(uv.y));
-  float fold = max(-direction.z, 0.0);
-  direction.x += direction.x >= 0.0 ? -fold : fold;
-  direction.y += direction.y >= 0.0 ? -fold : fold;
-  return normalize(direction);
-}
-
-vec2 octahedral_encode(vec3 direction)
-{
-  direction /= abs(direction.x) + abs(direction.y) + abs(direction.z);
-  if (direction.z < 0.0) {
-    vec2 folded = 1.0 - abs(direction.yx);
-    return vec2(direction.x >= 0.0 ? folded.x : -folded.x, direction.y >= 0.0 ? folded.y : -folded.y);
-  }
-  return direction.xy;
 }

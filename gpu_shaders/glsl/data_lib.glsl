@@ -9,3 +9,6 @@ ivec2 element_position(int index)
 {
   return ivec2(index & 4095, index >> 12);
 }
+
+/* Number of a thread of a linear dispatch, which is rows of 2²¹ threads: Python side as well. */
+#define LINEAR_THREAD (int(gl_GlobalInvocationID.y) * 2097152 + int(gl_GlobalInvocationID.x))

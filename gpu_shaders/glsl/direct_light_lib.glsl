@@ -13,31 +13,6 @@ struct LightSample {
   vec3 irradiance; /* per unit cosine at the surface: radiance × solid angle of the whole light */
 };
 
-vec2 sample_disk(vec2 u)
-{
-  float r = sqrt(u.x), phi = 6.283185307179586 * u.y;
-  return r * vec2(cos(phi), sin(phi));
-}
-
-/* Two unit vectors perpendicular to n: Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 2017. */
-void tangent_frame(vec3 n, out vec3 t, out vec3 b)
-{
-  float s = n.z >= 0.0 ? 1.0 : -1.0;
-  float a = -1.0 / (s + n.z);
-  float c = n.x * n.y * a;
-  t = vec3(1.0 + s * n.x * n.x * a, s * c, -s * n.x);
-  b = vec3(c, s + n.y * n.y * a, -n.y);
-}
-
-/* Direction with density cos/π about the normal (Malley's method). */
-vec3 sample_cosine(vec3 normal, vec2 u)
-{
-  vec3 t, b;
-  tangent_frame(normal, t, b);
-  vec2 disk = sample_disk(u);
-  return normalize(disk.x * t + disk.y * b + sqrt(max(1.0 - u.x, 0.0)) * normal);
-}
-
 /* The cone lives in the object's own frame: right.w and up.w undo its scale against that of the axis. */
 float spot_mask(int light, vec3 towards, vec3 back, vec4 parameters)
 {
@@ -149,6 +124,17 @@ vec3 lamps_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index
   for (int light = 0; light < light_count; light++) {
     vec2 u = sample_r2(key + uvec3(0u, 0u, uint(light) * 0x9E3779B9u), index);
     sum += light_irradiance(light, point, origin, normal, u);
+  }
+  return sum;
+}
+
+/* The same if nothing stood between. */
+vec3 lamps_unshadowed(vec3 point, vec3 normal, uvec3 key, int index)
+{
+  vec3 sum = vec3(0.0);
+  for (int light = 0; light < light_count; light++) {
+    LightSample light_sample = sample_light(light, point, sample_r2(key + uvec3(0u, 0u, uint(light) * 0x9E3779B9u), index));
+    sum += light_sample.irradiance * max(dot(light_sample.direction, normal), 0.0);
   }
   return sum;
 }

@@ -3,16 +3,46 @@
  * Two ways, each where it is denser: texels, which carry emitters that fill many of them, and points on the emitters, which carry
  * those that fall between texel centres. Every place on an emitter belongs to one of the two. Texel centres are not random, so
  * weights that mix the two would not sum to one over a small emitter.
- * A point is one of CANDIDATES, chosen by what it would send if nothing stood between; `samples` of them get a ray.
- * Dispatch: one group of GROUP threads a probe; fixed order of summation.
+ * CANDIDATE_COUNT points lie in order of the emitters and weigh what they would send if nothing stood between; `samples` of them get a
+ * ray, one each time the running sum of the weights has grown by an equal step. Front, back and every part of a lamp so get their
+ * exact share of the rays (systematic resampling; Kitagawa, "Monte Carlo Filter and Smoother", 1996, A.1).
+ * Dispatch: one group of GROUP threads a probe; each takes a run of candidates; fixed order of summation.
  */
 
 SHARED_ vec4 partial_sums[COEFFICIENTS * GROUP];
+SHARED_ float run_weights[GROUP];
+
+const int RUN = CANDIDATE_COUNT / GROUP;
 
 /* Candidate points on emitters per steradian, as a probe sees them. */
 float point_density(float density, float squared_distance, float cosine)
 {
-  return float(samples * CANDIDATES) * density * squared_distance / cosine;
+  return float(CANDIDATE_COUNT) * density * squared_distance / cosine;
+}
+
+struct Candidate {
+  vec3 radiance; /* divided by its density: 0 where texels are denser */
+  float weight;
+  vec3 direction;
+  float distance;
+};
+
+Candidate candidate(vec3 origin, uvec3 key, int index)
+{
+  Candidate result;
+  vec2 place = sample_r2(key, index);
+  float jitter = sample_r2(key + uvec3(1u, 0u, 0u), index).x;
+  EmitterSample emitter = sample_emitter(vec3(place, (float(index) + jitter) / float(CANDIDATE_COUNT)));
+  vec3 offset = emitter.point - origin;
+  float squared = max(dot(offset, offset), 1.0e-20);
+  result.distance = sqrt(squared);
+  result.direction = offset / result.distance;
+  float density = point_density(emitter.density, squared, max(abs(dot(result.direction, emitter.normal)), 1.0e-4));
+  ivec2 texel = direction_texel(result.direction);
+  bool in_texels = density * element(texel_weights, (texel.y % FACE) * FACE + texel.x).x < 1.0;
+  result.radiance = in_texels ? vec3(0.0) : emitter.radiance / density;
+  result.weight = result.radiance.r + result.radiance.g + result.radiance.b;
+  return result;
 }
 
 void main()
@@ -43,37 +73,27 @@ void main()
     }
   }
   uvec3 key = uvec3(uint(slot.w), 0xB5297A4Du, uint(seed));
-  for (int i = lane; i < samples; i += GROUP) {
-    vec3 best_radiance = vec3(0.0), best_direction = vec3(0.0);
-    float best_distance = 0.0, best_weight = 0.0, total = 0.0;
-    float choice = sample_r3(key + uvec3(0x68E31DA4u, 0u, 0u), i).x;
-    for (int j = 0; j < CANDIDATES; j++) {
-      EmitterSample emitter = sample_emitter(sample_r3(key, i * CANDIDATES + j));
-      vec3 offset = emitter.point - slot.xyz;
-      float squared = max(dot(offset, offset), 1.0e-20);
-      float distance = sqrt(squared);
-      vec3 direction = offset / distance;
-      float density = point_density(emitter.density, squared, max(abs(dot(direction, emitter.normal)), 1.0e-4));
-      ivec2 texel = direction_texel(direction);
-      bool in_texels = density * element(texel_weights, (texel.y % FACE) * FACE + texel.x).x < 1.0;
-      vec3 radiance = in_texels ? vec3(0.0) : emitter.radiance / density;
-      float weight = radiance.r + radiance.g + radiance.b;
-      total += weight;
-      if (weight > 0.0 && choice * total < weight) {
-        choice = choice * total / weight;
-        best_radiance = radiance;
-        best_direction = direction;
-        best_distance = distance;
-        best_weight = weight;
-      }
-      else if (total > weight) {
-        choice = (choice * total - weight) / (total - weight);
-      }
-    }
-    if (best_weight > 0.0 && !trace_any(slot.xyz, best_direction, best_distance * 0.9999)) {
-      sh_basis(best_direction, basis);
+  float run_weight = 0.0;
+  for (int i = 0; i < RUN; i++) {
+    run_weight += candidate(slot.xyz, key, lane * RUN + i).weight;
+  }
+  run_weights[lane] = run_weight;
+  barrier();
+  float before = 0.0, total = 0.0;
+  for (int i = 0; i < GROUP; i++) {
+    before += i < lane ? run_weights[i] : 0.0;
+    total += run_weights[i];
+  }
+  float step = total / float(samples);
+  for (int i = 0; i < RUN && total > 0.0; i++) {
+    Candidate chosen = candidate(slot.xyz, key, lane * RUN + i);
+    float after = before + chosen.weight;
+    float rays = floor(after / step + 0.5) - floor(before / step + 0.5);
+    before = after;
+    if (rays > 0.0 && !trace_any(slot.xyz, chosen.direction, chosen.distance * 0.9999)) {
+      sh_basis(chosen.direction, basis);
       for (int c = 0; c < COEFFICIENTS; c++) {
-        sum[c] += best_radiance * (basis[c] * total / best_weight);
+        sum[c] += chosen.radiance * (basis[c] * rays * step / chosen.weight);
       }
     }
   }
@@ -86,7 +106,7 @@ void main()
     for (int i = 0; i < GROUP; i++) {
       total += partial_sums[c * GROUP + i].rgb;
     }
-    ivec2 target = element_position(int(slot.w) * COEFFICIENTS + c);
+    ivec2 target = element_position((first_slot + probe) * COEFFICIENTS + c);
     imageStore(field, target, imageLoad(field, target) + vec4(total, 0.0));
   }
 }

@@ -1,7 +1,7 @@
 /* Which objects a probe sees, from which side and whether lit: 8×8 texels of each face, for core/orientation.py.
  *
  * Dispatch: one group of 96 threads a probe of the batch; each writes four texels: ±(object + 1), negative from behind, half a unit
- * farther from zero where light arrives or leaves; 0 background. Needs geometry, emission and source.
+ * farther from zero where light arrives or leaves; 0 background. Needs geometry, emission and patches with direct light.
  */
 
 void main()
@@ -17,7 +17,7 @@ void main()
     ivec3 at = ivec3(texel.x, face * FACE + texel.y, probe);
     vec4 seen = texelFetch(geometry, at, 0);
     if (seen.z < NO_SURFACE) {
-      vec3 light = texelFetch(emission, at, 0).rgb + texelFetch(source, at, 0).rgb;
+      vec3 light = texelFetch(emission, at, 0).rgb + texel_reflected(at);
       float value = seen.w + 1.0 + (light != vec3(0.0) ? 0.5 : 0.0);
       sighting[i] = seen.z < 0.0 ? -value : value;
     }

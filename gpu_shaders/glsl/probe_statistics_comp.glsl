@@ -47,7 +47,7 @@ void main()
       share.w += weight;
       share.x += element(shells, int(seen.y)).x == 0.0 ? weight : 0.0;
     }
-    vec3 light = texelFetch(emission, at, 0).rgb + texelFetch(source, at, 0).rgb;
+    vec3 light = texelFetch(emission, at, 0).rgb + texel_reflected(at);
     share.z += light != vec3(0.0) ? weight : 0.0;
   }
   partial_shares[lane] = share;

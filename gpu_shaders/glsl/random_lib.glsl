@@ -30,3 +30,28 @@ vec3 sample_r3(uvec3 key, int index)
   vec3 start = vec3(pcg3d(key) >> 8u) * (1.0 / 16777216.0);
   return fract(start + vec3(0.8191725133961645, 0.6710436067037893, 0.5497004779019703) * float(index));
 }
+
+vec2 sample_disk(vec2 u)
+{
+  float r = sqrt(u.x), phi = 6.283185307179586 * u.y;
+  return r * vec2(cos(phi), sin(phi));
+}
+
+/* Two unit vectors perpendicular to n: Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 2017. */
+void tangent_frame(vec3 n, out vec3 t, out vec3 b)
+{
+  float s = n.z >= 0.0 ? 1.0 : -1.0;
+  float a = -1.0 / (s + n.z);
+  float c = n.x * n.y * a;
+  t = vec3(1.0 + s * n.x * n.x * a, s * c, -s * n.x);
+  b = vec3(c, s + n.y * n.y * a, -n.y);
+}
+
+/* Direction with density cos/π about the normal (Malley's method). */
+vec3 sample_cosine(vec3 normal, vec2 u)
+{
+  vec3 t, b;
+  tangent_frame(normal, t, b);
+  vec2 disk = sample_disk(u);
+  return normalize(disk.x * t + disk.y * b + sqrt(max(1.0 - u.x, 0.0)) * normal);
+}

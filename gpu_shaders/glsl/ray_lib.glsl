@@ -200,3 +200,9 @@ vec3 step_off(vec3 point, vec3 normal, vec3 towards, float distance)
   float magnitude = max(max(abs(point.x), abs(point.y)), max(abs(point.z), distance));
   return point + (normal + towards) * (magnitude * STEP);
 }
+
+/* The same for a point of which nothing is known but where it lies: a ray found it from no farther than the scene's middle is twice. */
+vec3 leave_surface(vec3 point, vec3 normal)
+{
+  return step_off(point, normal, normal, 2.0 * length(point));
+}

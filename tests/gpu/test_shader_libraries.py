@@ -51,7 +51,7 @@ def test_directions_texels_and_harmonics(face):
     found = run(
         "directions",
         count,
-        libraries=["data_lib", "cubemap_lib", "spherical_harmonics_lib"],
+        libraries=["data_lib", "octahedral_lib", "cubemap_lib", "spherical_harmonics_lib"],
         elements=8 * count,
         inputs={"directions": directions},
         defines={"FACE": face, "BANDS": 4, "COEFFICIENTS": 16},

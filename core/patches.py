@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Patches: pieces of surface that share one irradiance.
+
+Light bounces between patches, and a texel of a probe shows the light of the patch that it lies on. Hundreds of probes
+that look at one wall so share its shadow rays and its bounces.
+
+Space is divided into cubic cells, and what lies in one cell, faces one way and is not cut off by a wall is a patch:
+
+    cell of edge s ┌────────┬────────┐
+                   │  ·   · ║ ·      │   · hits of texels and rays      ║ a wall: hits right of it do not see the
+      floor  ──────┼──·───·─║──·──·──┼   leader of the patch left of it and found a second one
+                   └────────┴────────┘
+
+s is a share of the probes' spacing and grows with the distance from the volume. Seen from a probe close by, a surface gets
+cells as small as the view demands (ANGLE), so patches are about equally small in every probe's sight. Rays between
+patches end on cells of the plain size.
+
+Everything here is deterministic: patches are numbered in the order in which hits are bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .cubemap import unpack_normal
+from .grid import Grid
+
+POINTS = 16  # places of a patch where light is measured
+RAYS = 8  # that leave a patch for others, from its points in turn; a multiple of 4
+SAMPLES = (4, 16, 64)  # of direct light: where it is even, uneven, very uneven
+NO_PATCH, NOTHING = -1, -2  # in place of a patch: not bound; nothing to bind
+ANGLE = 0.5  # radians: most edge of a patch as a probe sees it
+_MANY = 32768  # patches whose mean is good with the plain number of rays
+_MOST_EFFORT = 256
+_UNEVEN = (0.6, 3.0)  # error of four points, of the mean light, from which on the second and third number is taken
+_CELL_SHARE = 0.25  # of the grid's shortest spacing: edge of plain cells
+_LEAST_CELLS = 32  # plain cells along the diagonal of the volume's box
+_VARIANTS = 3  # patches of one cell that do not see each other; hits beyond join the last
+_FINEST = -10  # level: cells of 2⁻¹⁰ of the plain size
+_SHIFT = 0.37  # of a cell: walls tend to lie at round numbers
+_AXIS_BITS = 18
+
+
+def effort(count: int, samples: int) -> int:
+    """By how much RAYS and SAMPLES are multiplied for a bake of ``count`` patches with the setting ``samples``: what
+    probes see is the mean over patches, so few patches need more of each."""
+    few = 2 ** int(np.clip(np.ceil(np.log2(_MANY / max(count, 1))), 0, 3))
+    return min(few * samples, _MOST_EFFORT)
+
+
+def direct_samples(mean: np.ndarray, deviation: np.ndarray) -> np.ndarray:
+    """(N,) index into SAMPLES for patches whose points get irradiance of ``mean`` and ``deviation`` (N,) if nothing
+    stands between: the error of the mean by four points is held against the light of all patches."""
+    error = deviation / np.sqrt(SAMPLES[0]) / max(float(mean.mean()), 1e-30)
+    return np.searchsorted(_UNEVEN, error, side="right")
+
+
+class Patches:
+    """All patches of a bake. Positions are metres relative to the grid's centre.
+
+    ``points`` (N, POINTS, 4) float32: position and packed normal; the first is the leader, which every hit of the
+    patch sees. ``seen`` (N,) bool: a texel of a probe lies on it.
+    """
+
+    def __init__(self, grid: Grid):
+        spacing = grid.cell_size()
+        self.cell = min(_CELL_SHARE * float(np.exp(np.log(spacing).mean())), float(np.linalg.norm(grid.matrix[:3, :3] * 2)) / _LEAST_CELLS)
+        self._to_box = np.linalg.inv(grid.matrix[:3, :3])
+        self._half = np.linalg.norm(grid.matrix[:3, :3], axis=0)
+        self._keys = [np.zeros(0, np.uint64) for _ in range(_VARIANTS)]  # sorted
+        self._ids = [np.zeros(0, np.int64) for _ in range(_VARIANTS)]
+        self.points = np.zeros((0, POINTS, 4), np.float32)
+        self.seen = np.zeros(0, bool)
+
+    @property
+    def count(self) -> int:
+        return len(self.points)
+
+    def bind(
+        self,
+        hits: np.ndarray,
+        view_distance: np.ndarray | None,
+        sees: Callable[[np.ndarray, np.ndarray], np.ndarray],
+        found: bool = True,
+        coarser: int = 0,
+    ) -> np.ndarray:
+        """(H,) patch of each of ``hits`` (H, 4), position and packed normal; NO_PATCH for hits with a negative one.
+        Patches that are missing are founded, or left NO_PATCH without ``found``.
+
+        ``view_distance`` (H,) metres to the probe whose texels the hits are; None for ends of rays between patches.
+        ``sees(items, patches)`` tells which hits (by number) see the leader of a patch.
+        """
+        result = np.full(len(hits), NO_PATCH, np.int64)
+        pending = np.flatnonzero(hits[:, 3] >= 0)
+        keys = self._cell_keys(hits[pending], None if view_distance is None else view_distance[pending], coarser)
+        first_new = self.count
+        for variant in range(_VARIANTS):
+            if not len(pending):
+                break
+            unique, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
+            known = self._known(variant, unique)
+            if found:
+                self._found(variant, unique, known, hits[pending[first]])
+            ids = known[inverse]
+            joined = (ids >= first_new) & (first[inverse] == np.arange(len(pending)))  # a leader sees itself
+            ask = np.flatnonzero((ids >= 0) & ~joined)
+            if len(ask):
+                joined[ask] = sees(pending[ask], ids[ask]) if variant < _VARIANTS - 1 else True
+            result[pending[joined]] = ids[joined]
+            pending, keys = pending[~joined], keys[~joined]
+        if view_distance is not None:
+            self.seen[result[result >= 0]] = True
+        if found:
+            self._choose_points(first_new, hits, result)
+        return result
+
+    def _cell_keys(self, hits: np.ndarray, view_distance: np.ndarray | None, coarser: int) -> np.ndarray:
+        """(H,) uint64: size, place and facing of the cell that each of ``hits`` lies in."""
+        position = hits[:, :3].astype(np.float64)
+        beyond = np.maximum(np.abs(position @ self._to_box.T) - 1.0, 0.0) * self._half
+        wanted = np.maximum(0.5 * ANGLE / self.cell * np.sqrt((beyond**2).sum(axis=1)), 1.0)
+        if view_distance is not None:
+            wanted = np.minimum(wanted, np.maximum(ANGLE / self.cell * view_distance, 2.0**_FINEST))
+        level = np.floor(np.log2(wanted)).astype(np.int64) + coarser
+        place = np.floor(position / (self.cell * 2.0**level)[:, None] + _SHIFT).astype(np.int64)
+        place &= (1 << _AXIS_BITS) - 1
+        normal = unpack_normal(hits[:, 3].astype(np.float64))
+        facing = np.rint(normal / np.abs(normal).max(axis=1, keepdims=True)).astype(np.int64) + 1  # 26 directions
+        key = ((level + 16) * 27 + facing @ np.array([9, 3, 1])).astype(np.uint64)
+        for axis in range(3):
+            key = (key << np.uint64(_AXIS_BITS)) | place[:, axis].astype(np.uint64)
+        return key
+
+    def _known(self, variant: int, unique: np.ndarray) -> np.ndarray:
+        """(U,) patches with the sorted keys ``unique`` (U,), NO_PATCH where there is none."""
+        keys, ids = self._keys[variant], self._ids[variant]
+        at = np.searchsorted(keys, unique)
+        result = np.full(len(unique), NO_PATCH, np.int64)
+        inside = np.flatnonzero(at < len(keys))
+        same = inside[keys[at[inside]] == unique[inside]]
+        result[same] = ids[at[same]]
+        return result
+
+    def _found(self, variant: int, unique: np.ndarray, known: np.ndarray, leaders: np.ndarray) -> None:
+        """Founds patches for those of the sorted keys ``unique`` (U,) that are not in ``known`` (U,), led by
+        ``leaders`` (U, 4), and completes ``known``."""
+        fresh = known == NO_PATCH
+        count = int(fresh.sum())
+        known[fresh] = self.count + np.arange(count)
+        at = np.searchsorted(self._keys[variant], unique[fresh])
+        self._keys[variant] = np.insert(self._keys[variant], at, unique[fresh])
+        self._ids[variant] = np.insert(self._ids[variant], at, known[fresh])
+        points = np.repeat(leaders[fresh, None], POINTS, axis=1).astype(np.float32)
+        self.points = np.concatenate([self.points, points])
+        self.seen = np.concatenate([self.seen, np.zeros(count, bool)])
+
+    def _choose_points(self, first_new: int, hits: np.ndarray, patch: np.ndarray) -> None:
+        """Spreads the points of patches from ``first_new`` on over the hits that founded them."""
+        member = np.flatnonzero(patch >= first_new)
+        member = member[np.argsort(patch[member], kind="stable")]
+        count = np.bincount(patch[member] - first_new, minlength=self.count - first_new)
+        start = np.cumsum(count) - count
+        chosen = start[:, None] + np.arange(POINTS) * count[:, None] // POINTS
+        self.points[first_new:] = hits[member[chosen]]

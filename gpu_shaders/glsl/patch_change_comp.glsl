@@ -1,0 +1,32 @@
+/* How far iterations are apart: sums over the patches that probes see, of the last three irradiances.
+ *
+ * Dispatch: one group of 256 threads; fixed order of summation. Writes one texel: |new|², |new − old|²,
+ * (new − old)·(old − older), luminance.
+ */
+
+SHARED_ vec4 partial_sums[256];
+
+void main()
+{
+  int lane = int(gl_LocalInvocationID.x);
+  vec4 sum = vec4(0.0);
+  for (int i = lane; i < patch_count; i += 256) {
+    vec3 fresh = element(irradiance_new, i).rgb;
+    vec3 old = element(irradiance_old, i).rgb;
+    vec3 change = fresh - old;
+    vec3 last_change = old - element(irradiance_older, i).rgb;
+    float weight = element(patch_seen, i >> 2)[i & 3];
+    sum += weight * vec4(dot(fresh, fresh), dot(change, change), dot(change, last_change), dot(fresh, vec3(0.2126, 0.7152, 0.0722)));
+  }
+  partial_sums[lane] = sum;
+  barrier();
+  for (int half_count = 128; half_count > 0; half_count /= 2) {
+    if (lane < half_count) {
+      partial_sums[lane] += partial_sums[lane + half_count];
+    }
+    barrier();
+  }
+  if (lane == 0) {
+    imageStore(change, ivec2(0), partial_sums[0]);
+  }
+}

@@ -1,0 +1,56 @@
+/* Rays that leave patches: where they end, what part of the light there comes back, and what light they bring along.
+ *
+ * Dispatch: one thread a ray from first_ray on, RAYS a patch; groups of 64. Directions are cosine-weighted (Malley), stratified over the
+ * patch; with SEGMENTS above 1 a ray goes on as a path, and direct light is sampled where it bounces.
+ * Writes for each ray, counted from first_ray: hits (position, packed normal; −1 where nothing more can come), `carried` (emission that points
+ * on emitters do not answer for, or the world, and direct light at the bounces) and `reflected` (product of the albedos on the way).
+ */
+
+void main()
+{
+  int entry = LINEAR_THREAD;
+  if (entry >= ray_count) {
+    return;
+  }
+  int patch_index = (first_ray + entry) / RAYS;
+  int number = (first_ray + entry) - patch_index * RAYS;
+  vec4 at = element(patch_points, POINTS * patch_index + number * POINTS / RAYS % POINTS);
+  vec3 normal = unpack_normal(at.w);
+  vec3 origin = leave_surface(at.xyz, normal);
+  uvec3 key = uvec3(uint(first_key + patch_index), 0x85EBCA6Bu, uint(seed));
+  vec4 end = vec4(0.0, 0.0, 0.0, -1.0);
+  vec3 brought = vec3(0.0), throughput = vec3(1.0);
+  throughput = at.w < 0.0 ? vec3(0.0) : throughput; /* a texel that reflects nothing */
+  for (int segment = 0; segment < SEGMENTS && throughput != vec3(0.0); segment++) {
+    vec3 direction = sample_cosine(normal, sample_r2(key + uvec3(0u, uint(segment), 0u), number));
+    Hit hit = trace_closest(origin, direction);
+    if (hit.triangle < 0) {
+      ivec2 texel = direction_texel(direction);
+      brought += throughput * element(world_texels, texel.y * FACE + texel.x).rgb;
+      throughput = vec3(0.0);
+      break;
+    }
+    Surface surface = resolve_surface(hit.triangle, hit.barycentric, origin, direction, 0.5);
+    brought += surface.emitter_density == 0.0 ? throughput * surface.emission : vec3(0.0);
+    throughput *= surface.albedo;
+    if (throughput == vec3(0.0)) {
+      break;
+    }
+    end = vec4(surface.position, pack_normal(octahedral_encode(surface.normal)));
+#if SEGMENTS > 1
+    if (segment < SEGMENTS - 1) {
+      normal = surface.normal;
+      origin = step_off(surface.position, normal, -direction, hit.distance);
+      uvec3 light_key = key + uvec3(0u, 0x1B873593u + uint(segment), 0u);
+      vec3 irradiance = lamps_irradiance(surface.position, origin, normal, light_key, number);
+#ifdef HAS_EMITTERS
+      irradiance += emitter_irradiance(surface.position, origin, normal, light_key, number);
+#endif
+      brought += throughput * irradiance * 0.3183098861837907;
+    }
+#endif
+  }
+  imageStore(hits, element_position(entry), throughput == vec3(0.0) ? vec4(0.0, 0.0, 0.0, -1.0) : end);
+  imageStore(carried, element_position(entry), vec4(brought, 0.0));
+  imageStore(reflected, element_position(entry), vec4(throughput, 0.0));
+}

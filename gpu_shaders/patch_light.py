@@ -1,0 +1,307 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light between patches on the GPU: which patch every texel lies on, direct light, rays between patches, bounces.
+
+core/patches.py decides what a patch is; here its points are lit and its rays traced. Everything that depends on
+geometry alone (points, ends of rays, what they reflect) stays where it is when only lights change.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import gpu
+import numpy as np
+
+from ..core.grid import Grid
+from ..core.patches import NO_PATCH, NOTHING, POINTS, RAYS, SAMPLES, Patches, direct_samples, effort
+from ..core.settings import BakeSettings
+from .programs import program
+from .scene_textures import SceneTextures
+from .textures import allocate, read, upload
+
+_GROUP = 64
+_GROUPS_IN_ROW = 2**21 // _GROUP  # as LINEAR_THREAD counts
+_RAYS_AT_ONCE = 1 << 20
+_COARSEST = 3  # levels by which patches grow that only rays see
+_MOST_ROUNDS = 12  # of rays that find surface which nothing has seen before
+
+
+@dataclass
+class _Rays:
+    """What ``count`` rays found, see patch_rays_comp.glsl, and the irradiance they brought along, by patch."""
+
+    count: int
+    hits: gpu.types.GPUTexture
+    brought: gpu.types.GPUTexture
+    reflected: gpu.types.GPUTexture
+
+
+class PatchLight:
+    """Patches of one bake with their light."""
+
+    def __init__(self, scene: SceneTextures, grid: Grid, settings: BakeSettings, world_texels):
+        """``world_texels``: the world's radiance as a linear texture, faces of ``settings.face``²."""
+        self.patches = Patches(grid)
+        self._scene, self._settings = scene, settings
+        self._world_texels = world_texels
+        self._lit = 0  # patches whose direct light is known
+        self._effort = 1
+        self._direct = np.zeros((0, 4), np.float32)
+        self.direct = upload(self._direct, "patches")
+        self._change = gpu.types.GPUTexture((1, 1), format="RGBA32F")
+
+    @property
+    def count(self) -> int:
+        return self.patches.count
+
+    # Which patch
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def bind_texels(self, hits: gpu.types.GPUTexture, view: np.ndarray) -> gpu.types.GPUTexture:
+        """Patches of texels, four an element: ``hits`` as texel_hits_comp writes them, ``view`` (probes, 3) positions
+        relative to the grid's centre."""
+        texels = 6 * self._settings.face**2
+        values = read(hits, len(view) * texels)
+        distance = np.linalg.norm(values[:, :3].reshape(len(view), texels, 3) - view[:, None], axis=2).reshape(-1)
+        return upload(_fours(self.patches.bind(values, distance, self._sees(hits))), "texels")
+
+    def _sees(self, hits: gpu.types.GPUTexture):
+        def sees(items: np.ndarray, patches: np.ndarray) -> np.ndarray:
+            shader = program("patch_visible_comp", POINTS=POINTS, **self._scene.ray_defines)
+            pairs = np.zeros((len(items), 4), np.float32)
+            pairs[:, 0], pairs[:, 1] = items, patches
+            visible = allocate(len(items), "hits", "R32F")
+            pair_texture, points = upload(pairs, "hits"), upload(self.patches.points, "patches")
+            self._scene.bind_rays(shader)
+            shader.uniform_sampler("hits", hits)
+            shader.uniform_sampler("pairs", pair_texture)
+            shader.uniform_sampler("patch_points", points)
+            shader.image("visible", visible)
+            shader.uniform_int("pair_count", (len(items),))
+            _dispatch(shader, len(items))
+            return read(visible, len(items), channels=1)[:, 0] > 0
+
+        return sees
+
+    # Light
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def light_new_patches(self) -> None:
+        """Direct light of the patches that were bound since the last call."""
+        if self._lit == self.count:
+            return
+        if self._lit == 0:
+            self._effort = effort(self.count, self._settings.samples)
+        points = upload(self.patches.points, "patches")
+        direct = allocate(self.count, "patches")
+        sample_class = self._sample_class(points)
+        for index, samples in enumerate(SAMPLES):
+            chosen = self._lit + np.flatnonzero(sample_class == index)
+            self._light(points, POINTS, chosen, samples * self._effort, direct)
+        fresh = read(direct, self.count)[self._lit :]
+        self._direct = np.concatenate([self._direct, fresh])
+        self._lit = self.count
+        self.direct = upload(self._direct, "patches")
+
+    def _sample_class(self, points: gpu.types.GPUTexture) -> np.ndarray:
+        """Index into SAMPLES of each patch that is not lit yet."""
+        count = self.count - self._lit
+        shader = program("patch_spread_comp", POINTS=POINTS, **self._scene.light_defines)
+        spread = allocate(count, "patches")
+        self._scene.bind_lights(shader)
+        shader.uniform_sampler("patch_points", points)
+        shader.image("spread", spread)
+        for name, value in (("first_patch", self._lit), ("patch_count", count), ("seed", self._settings.seed)):
+            shader.uniform_int(name, (value,))
+        _dispatch(shader, count)
+        mean, deviation = read(spread, count)[:, :2].T
+        return direct_samples(mean, deviation)
+
+    def _light(self, points, points_each: int, chosen: np.ndarray, samples: int, direct, first_key: int = 0) -> None:
+        """Direct light of the patches ``chosen`` (N,) with ``points_each`` places in ``points``, into ``direct``."""
+        rows = np.zeros((len(chosen), 4), np.float32)
+        rows[:, 0] = chosen
+        patches = upload(rows, "patches")
+        shader = program("patch_direct_comp", POINTS=points_each, **self._scene.light_defines)
+        self._scene.bind_lights(shader)
+        shader.uniform_sampler("patches", patches)
+        shader.uniform_sampler("patch_points", points)
+        shader.image("direct", direct)
+        for name, value in (
+            ("patch_count", len(chosen)),
+            ("first_key", first_key),
+            ("samples", samples),
+            ("seed", self._settings.seed),
+        ):
+            shader.uniform_int(name, (value,))
+        _dispatch(shader, len(chosen))
+
+    # Rays
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def connect(self) -> None:
+        """Traces the rays between patches, round by round until they find no surface that is no patch yet, and makes
+        room for the bounces."""
+        ends, brought, reflected = [np.zeros(0)], [np.zeros((0, 4))], [np.zeros((0, 4))]
+        self._rays_each = RAYS * self._effort
+        at_once = max(1, _RAYS_AT_ONCE // self._rays_each)
+        stop = 0
+        for round_ in range(_MOST_ROUNDS):
+            start, stop = stop, self.count
+            points = upload(self.patches.points, "patches")
+            for first in range(start, stop, at_once):
+                rays = self._trace(points, POINTS, first, min(stop - first, at_once), self._rays_each)
+                ends.append(self._bind_ends(rays.hits, rays.count, round_))
+                brought.append(read(rays.brought, rays.count // self._rays_each))
+                reflected.append(read(rays.reflected, rays.count))
+            if stop == self.count:
+                break
+        self.light_new_patches()
+        self._ends = upload(_fours(np.concatenate(ends)), "rays")
+        self._brought = upload(np.concatenate(brought), "patches")
+        self._reflected = upload(np.concatenate(reflected), "rays")
+        self._seen = upload(_fours(self.patches.seen), "patches")
+        self._irradiance = [allocate(self.count, "patches") for _ in range(3)]
+
+    def _bind_ends(self, hits: gpu.types.GPUTexture, count: int, round_: int) -> np.ndarray:
+        """(count,) patches on which rays of a round end, NOTHING where no light comes back. What only rays see gets the
+        coarser patches the more rays it takes to see it, in the last round none."""
+        values = read(hits, count)
+        ends = self.patches.bind(values, None, self._sees(hits), found=round_ == 0)
+        lost = (ends == NO_PATCH) & (values[:, 3] >= 0)
+        if lost.any() and 0 < round_ < _MOST_ROUNDS - 1:
+            values[~lost, 3] = -1.0
+            founded = self.patches.bind(values, None, self._sees(hits), coarser=min(round_, _COARSEST))
+            ends[lost] = founded[lost]
+            lost = np.zeros(count, bool)
+        ends[(ends == NO_PATCH) & ~lost] = NOTHING
+        return ends
+
+    def _trace(self, points, points_each: int, first: int, count: int, rays_each: int, segments: int = 1, first_key=0):
+        """``rays_each`` rays of each of ``count`` patches from ``first``, with ``points_each`` places in ``points``."""
+        rays = count * rays_each
+        hits, carried, reflected = (allocate(rays, "rays") for _ in range(3))
+        is_path = segments > 1
+        defines = self._scene.surface_defines | (self._scene.light_defines if is_path else {})
+        shader = program(
+            "patch_rays_comp",
+            FACE=self._settings.face,
+            POINTS=points_each,
+            RAYS=rays_each,
+            SEGMENTS=segments,
+            **(defines | {"HAS_IMAGES": self._scene.has_images}),
+        )
+        self._scene.bind_surfaces(shader)
+        if is_path:
+            self._scene.bind_lights(shader)
+        shader.uniform_sampler("patch_points", points)
+        shader.uniform_sampler("world_texels", self._world_texels)
+        for name, texture in (("hits", hits), ("carried", carried), ("reflected", reflected)):
+            shader.image(name, texture)
+        for name, value in (
+            ("first_ray", first * rays_each),
+            ("ray_count", rays),
+            ("first_key", first_key),
+            ("seed", self._settings.seed),
+        ):
+            shader.uniform_int(name, (value,))
+        _dispatch(shader, rays)
+        brought = allocate(count, "patches")
+        shader = program("patch_carried_comp", RAYS=rays_each)
+        shader.uniform_sampler("carried", carried)
+        shader.image("brought", brought)
+        shader.uniform_int("patch_count", (count,))
+        _dispatch(shader, count)
+        return _Rays(rays, hits, brought, reflected)
+
+    # Bounces
+    # ------------------------------------------------------------------------------------------------------------------
+
+    @property
+    def irradiance(self) -> gpu.types.GPUTexture:
+        """Newest irradiance, an element a patch."""
+        return self._irradiance[0]
+
+    def iterate(self, bounce: bool) -> tuple[float, float, float, float]:
+        """The first irradiance, of direct light, or one bounce more.
+
+        Returns sums over patches in probes' sight: |irradiance|², |change|², change · change before, luminance.
+        """
+        self._irradiance.insert(0, self._irradiance.pop())
+        self._bounce(
+            self.direct,
+            self._brought,
+            self._reflected,
+            self._ends,
+            self._rays_each,
+            self.count,
+            self._irradiance[0],
+            bounce,
+        )
+        shader = program("patch_change_comp")
+        for name, texture in zip(("irradiance_new", "irradiance_old", "irradiance_older"), self._irradiance):
+            shader.uniform_sampler(name, texture)
+        shader.uniform_sampler("patch_seen", self._seen)
+        shader.image("change", self._change)
+        shader.uniform_int("patch_count", (self.count,))
+        gpu.compute.dispatch(shader, 1, 1, 1)
+        return tuple(read(self._change, 1)[0].tolist())
+
+    def _bounce(self, direct, brought, reflected, ends, rays_each: int, count: int, target, bounce: bool = True) -> None:
+        """Irradiance of ``count`` patches from the newest irradiance at the ends of their rays, into ``target``."""
+        shader = program("patch_iterate_comp", RAYS=rays_each)
+        for name, texture in (
+            ("direct", direct),
+            ("brought", brought),
+            ("reflected", reflected),
+            ("ray_ends", ends),
+            ("irradiance_in", self._irradiance[1] if target is self._irradiance[0] else self._irradiance[0]),
+        ):
+            shader.uniform_sampler(name, texture)
+        shader.image("irradiance_out", target)
+        shader.uniform_int("patch_count", (count,))
+        shader.uniform_int("bounce", (int(bounce),))
+        _dispatch(shader, count)
+
+    def extrapolate(self, factor: float) -> None:
+        """irradiance += factor · (irradiance − irradiance of the iteration before)."""
+        shader = program("patch_extrapolate_comp")
+        shader.uniform_sampler("irradiance_old", self._irradiance[1])
+        shader.image("irradiance", self._irradiance[0])
+        shader.uniform_int("patch_count", (self.count,))
+        shader.uniform_float("factor", factor)
+        _dispatch(shader, self.count)
+
+    # Final gather
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def gather(self, hits: gpu.types.GPUTexture, count: int, first_key: int) -> gpu.types.GPUTexture:
+        """Irradiance of ``count`` texels by light and paths of their own instead of their patches': ``hits`` as
+        texel_hits_comp writes them, ``first_key`` the number of the first texel among all."""
+        settings = self._settings
+        rays_each = gather_rays(settings.samples)
+        direct, result = allocate(count, "texels"), allocate(count, "texels")
+        reflects = np.flatnonzero(read(hits, count)[:, 3] >= 0)
+        self._light(hits, 1, reflects, settings.samples, direct, first_key)
+        rays = self._trace(hits, 1, 0, count, rays_each, settings.gather, first_key)
+        ends = upload(_fours(self._bind_ends(rays.hits, rays.count, _MOST_ROUNDS - 1)), "rays")
+        self._bounce(direct, rays.brought, rays.reflected, ends, rays_each, count, result)
+        return result
+
+
+def gather_rays(samples: int) -> int:
+    """Rays of one texel in the final gather."""
+    return 4 * -(-samples // 4)
+
+
+def _dispatch(shader, threads: int) -> None:
+    groups = -(-threads // _GROUP)
+    if groups:
+        gpu.compute.dispatch(shader, min(groups, _GROUPS_IN_ROW), -(-groups // _GROUPS_IN_ROW), 1)
+
+
+def _fours(values: np.ndarray) -> np.ndarray:
+    """``values`` (N,) as rows of four, padded with zeros."""
+    rows = np.zeros(-(-len(values) // 4) * 4, np.float32)
+    rows[: len(values)] = values
+    return rows.reshape(-1, 4)
