@@ -11,6 +11,7 @@ ALBEDO = (0.8, 0.5, 0.25)
 def build(person, radiance=RADIANCE, lamp=False):
     """A 6 m cube seen from inside, with a uniform field: every surface shows albedo × radiance of indirect light."""
     volumes = person.module("scene.volumes")
+    person.module("viewport.view_images").SAMPLES = 4  # enough for plain colours
     cube = bpy.data.objects["Cube"]
     cube.scale = (3, 3, 3)
     cube.active_material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (*ALBEDO, 1)
