@@ -130,5 +130,5 @@ def _grid(kind, random):
         resolution = (*resolution[:2], 1)
     elif kind == "single":
         resolution = (1, 1, 1)
-    matrix[:3, 3] = 0.03 * random.normal(size=3) if kind not in ("on the walls", "into the walls") else 0.0
+    matrix[:3, 3] = 0.0 if kind == "on the walls" else 0.01 * random.normal(size=3)
     return Grid(matrix, resolution)

@@ -56,10 +56,11 @@ def check_finite_and_the_same_again(spec):
     assert sum(first.counts[state] for state in ("active", "culled", "invalid")) == grid.count
 
 
-def check_scale(spec, factor=37.0):
+def check_scale(spec, factor=32.0):
+    """A power of two, so that rounding leaves every choice of samples as it is."""
     snapshot, grid = spec.build()
     one, many = (fields_of(bake(s, grid, SETTINGS)) for s in (snapshot, scaled(snapshot, factor)))
-    np.testing.assert_allclose(many, factor * one, rtol=1e-4, atol=1e-5 * factor * np.abs(one).max())
+    np.testing.assert_allclose(many, factor * one, rtol=1e-5, atol=1e-6 * factor * np.abs(one).max())
 
 
 def check_sum(spec):
@@ -83,22 +84,27 @@ def check_sum(spec):
 
 
 def check_turn(spec):
-    """Quarter turns map texels on texels; without chance, so with lamps that have no extent."""
+    """Quarter turns map texels on texels: without chance, so with lamps that have no extent, and without rays that run
+    along walls, only rounding is left. Bounces ask depth maps, whose texels lie otherwise after a turn."""
+    if spec.volume == "on the walls":
+        return
     snapshot, grid = spec.build()
     points = [light if light.kind != "AREA" else replace(light, kind="POINT") for light in snapshot.lights]
     matt = [replace(material, emission=(0.0, 0.0, 0.0)) for material in snapshot.materials]
     snapshot = replace(snapshot, lights=points, materials=matt)
     turn = np.eye(4)[[1, 2, 0, 3] if spec.seed % 2 else [1, 0, 2, 3]]
     turn[:3, 1] *= np.linalg.det(turn)
-    straight = bake(snapshot, grid, SETTINGS)
-    turned = bake(moved(snapshot, turn), Grid(turn @ grid.matrix, grid.resolution), SETTINGS)
-    if straight.field.offset.any() or turned.field.offset.any():
-        return  # which of two ways out of a wall is the shorter one may be up to rounding
-    np.testing.assert_array_equal(turned.field.state, straight.field.state)
-    expected = irradiance_at_nodes(straight.field)
-    found = irradiance_at_nodes(turned.field, AXES @ turn[:3, :3].T)
-    rms = np.sqrt(((found - expected) ** 2).mean())
-    assert rms <= 2e-2 * np.sqrt((expected**2).mean())
+    there = moved(snapshot, turn), Grid(turn @ grid.matrix, grid.resolution)
+    for bounces, tolerance in ((0, 1e-3), (3, 3e-2 if spec.volume == "inside" else 0.2)):
+        choice = replace(SETTINGS, bounces=bounces)
+        straight, turned = bake(snapshot, grid, choice), bake(*there, choice)
+        if straight.field.offset.any() or turned.field.offset.any():
+            return  # which of two ways out of a wall is the shorter one may be up to rounding
+        np.testing.assert_array_equal(turned.field.state, straight.field.state)
+        expected = irradiance_at_nodes(straight.field)
+        found = irradiance_at_nodes(turned.field, AXES @ turn[:3, :3].T)
+        rms = np.sqrt(((found - expected) ** 2).mean())
+        assert rms <= tolerance * np.sqrt((expected**2).mean())
 
 
 def check_paint(spec):
