@@ -56,6 +56,7 @@ class _Job:
         if _running is not self:
             return
         _running, _last_failure = None, failure
+        self.task.close()
         self._manager.event_timer_remove(self._timer)
         self._manager.progress_end()
         for workspace in self._workspaces:
@@ -111,8 +112,8 @@ class GRIDLIGHT_OT_bake(bpy.types.Operator):
 
     def modal(self, context, event):
         job = self._job
-        if _running is not job:  # ended from outside: another file, the extension switched off
-            return {"CANCELLED"}
+        if _running is not job:  # ended from outside, and this is the first event since
+            return {"CANCELLED", "PASS_THROUGH"}
         if event.type == "ESC" and event.value == "PRESS":
             job.task.stop("The bake was cancelled; everything is as it was")
         elif event.type != "TIMER" and not job.task.stopped:

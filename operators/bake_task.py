@@ -44,7 +44,7 @@ class BakeTask:
 
     def __next__(self) -> None:
         if self._stop_reason:
-            self._steps.close()  # lets go of the GPU's textures
+            self.close()
             raise Cancelled(self._stop_reason)
         next(self._steps)
 
@@ -54,6 +54,10 @@ class BakeTask:
     def stop(self, reason: str) -> None:
         """Makes the next step the last. ``reason`` is a line for the user."""
         self._stop_reason = self._stop_reason or reason
+
+    def close(self) -> None:
+        """Lets go of everything on the GPU. Whoever keeps the task itself keeps little."""
+        self._steps.close()
 
     @property
     def stopped(self) -> bool:

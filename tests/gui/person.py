@@ -168,6 +168,17 @@ class Person:
         yield REACTION_SECONDS / 2
         subprocess.run(["xdotool", "click", str(button)], check=True)
         yield REACTION_SECONDS
+        yield from self.settle()
+
+    def settle(self) -> Iterator[float]:
+        """Waits until the sidebar stands still: panels open and close in motion."""
+        before = None
+        for _ in range(LOOKS):
+            seen = self.look(self.rectangle(self.region("UI")))
+            if before is not None and seen.shape == before.shape and (seen == before).all():
+                return
+            before = seen
+            yield REACTION_SECONDS
 
     def click_text(self, text: str, rectangle: Rectangle | None = None) -> Iterator[float]:
         """Reads the screen until ``text`` is found and clicks it. By default in the 3D viewport's sidebar."""

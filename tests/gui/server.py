@@ -25,6 +25,14 @@ FIRST_SECONDS = 1.5  # a window that has just appeared takes no notice of clicks
 SETTLE_SECONDS = 0.3  # after loading a file: time for its windows to be drawn
 
 
+_unseen: list[str] = []  # exceptions in handlers, timers and panels: Blender prints them and goes on
+
+
+def _note_exception(kind, error, trace) -> None:
+    _unseen.append("".join(traceback.format_exception(kind, error, trace)))
+    sys.__excepthook__(kind, error, trace)
+
+
 class Server:
     """Drives one scenario at a time."""
 
@@ -53,7 +61,7 @@ class Server:
         return POLL_SECONDS
 
 
-def _scenario(file: str, name: str):
+def _scenario(file: str, name: str, arguments: list):
     """A fresh file, the scenario, and what must hold after each."""
     addon_utils.enable(EXTENSION)  # a scenario may have failed with the extension switched off
     bpy.ops.wm.read_homefile(use_factory_startup=True)
@@ -61,13 +69,16 @@ def _scenario(file: str, name: str):
     spec = importlib.util.spec_from_file_location(Path(file).stem, file)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    person = Person(name)
+    person = Person("-".join([name, *map(str, arguments)]))
+    _unseen.clear()
     try:
-        yield from getattr(module, name)(person)
+        yield from getattr(module, name)(person, *arguments)
     except Exception:
         person.picture("failure")
         raise
+    yield SETTLE_SECONDS
     person.check_nothing_leaked()
+    assert not _unseen, "\n".join(_unseen)
 
 
 def _write(path: Path, value: dict) -> None:
@@ -78,6 +89,7 @@ def _write(path: Path, value: dict) -> None:
 
 def _start() -> None:
     folder, extension = sys.argv[sys.argv.index("--gridlight-test-server") + 1 :]
+    sys.excepthook = _note_exception
     preferences = bpy.context.preferences
     preferences.view.show_splash = False
     preferences.view.ui_scale = 1.0

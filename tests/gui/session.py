@@ -55,7 +55,7 @@ class BlenderSession:
         self._serial = 0
         self._broken = False  # starting failed: the next tests need not try again
 
-    def run(self, file: str, name: str, timeout: float) -> None:
+    def run(self, file: str, name: str, arguments: list, timeout: float) -> None:
         """Runs scenario ``name`` of ``file`` and fails the test with what went wrong there."""
         if self._broken:
             pytest.fail(f"Blender ({self._backend}) cannot be started, see the first failure", pytrace=False)
@@ -66,7 +66,7 @@ class BlenderSession:
         self._serial += 1
         said = len(self._log())
         task = self._folder / f"task{self._serial}.json"
-        _write(task, {"file": file, "name": name})
+        _write(task, {"file": file, "name": name, "arguments": arguments})
         answer = self._wait(self._folder / f"answer{self._serial}.json", timeout)
         if answer["failure"]:
             log = "\n".join(self._log()[said:][-LOG_TAIL_LINES:])
