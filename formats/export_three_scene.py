@@ -14,7 +14,7 @@ import numpy as np
 from ..core.panorama import panorama_solid_angles
 from ..core.snapshot import Light, SceneSnapshot
 
-_WIDEST = 1.48  # rad; half the cone of the spot that stands in for an area light
+_WIDEST = 1.3  # rad; half the cone of the spot that stands in for an area light: what a shadow map can hold
 
 
 def describe(snapshot: SceneSnapshot, axes: np.ndarray, model: str) -> dict:

@@ -114,7 +114,7 @@ function probeSpheres( grid ) {
 }
 
 // Points, spots and suns carry over exactly. three.js casts no shadows from area lights, so a spot of the same power
-// stands in for one: its cone falls off about as the cosine of a flat lamp does.
+// stands in for one: its cone falls off about as the cosine of a flat lamp does. Direct light here is a sketch; light from probes is not.
 function addLamp( group, lamp, radius ) {
 
 	const color = new THREE.Color().setRGB( ...lamp.color );
@@ -138,8 +138,10 @@ function addLamp( group, lamp, radius ) {
 	}
 
 	light.castShadow = lamp.shadow;
-	light.shadow.mapSize.set( 1024, 1024 );
-	light.shadow.normalBias = 0.02;
+	light.shadow.mapSize.set( 2048, 2048 );
+	light.shadow.normalBias = 0.04;
+	light.shadow.bias = - 0.0005;
+	light.shadow.camera.near = 0.05;
 	group.add( light );
 
 }
