@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ..core.field import Field
 from ..core.snapshot import Light, SceneSnapshot, World
 from ..gpu_shaders.scene_textures import SceneTextures
 from ..gpu_shaders.viewport_field import FieldTextures
@@ -39,6 +40,11 @@ class GpuScene:
             field = load_field(scene.objects[volume.name])
             if field is not None:
                 self.fields[volume.name] = FieldTextures(field, self.origin)
+        self.drawing.set_fields(list(self.fields.values()))
+
+    def show_fields(self, fields: dict[str, Field]) -> None:
+        """Shows ``fields`` instead of those of the volumes of these names."""
+        self.fields |= {name: FieldTextures(field, self.origin) for name, field in fields.items()}
         self.drawing.set_fields(list(self.fields.values()))
 
     def set_lights(self, lights: list[Light]) -> None:

@@ -176,6 +176,10 @@ def _tick() -> float | None:
         scene = session.scene
         version = session.version
         session.update(scene, _view_layer(scene))
+        preview = scene.gridlight.preview
+        if preview.live and preview.enabled:
+            session.relight(scene, preview.frame_budget_ms / 1000)
+            busy |= session.is_relighting
         busy |= session.is_pending
         settings = _shown_settings(scene)
         if session.version != version or session.shown_settings != settings:

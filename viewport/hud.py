@@ -53,7 +53,7 @@ def lines(context: bpy.types.Context, session: SceneSession, preview) -> list[st
         readout = session.readout
         rate = f"{readout.frames_per_second:.0f} frames/s"
         age = f"light {readout.age_seconds:.1f} s old" if readout.age_seconds else "light up to date"
-        shown.append(f"{rate}, {readout.probes_per_frame} probes/frame, {age}")
+        shown.append(f"{rate}, {readout.probes_per_frame} probes/frame, {age}" if session.gpu.fields else rate)
     return shown
 
 

@@ -8,17 +8,21 @@ happen in ``tick``. A session lives as long as some view of its scene shows Grid
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import bpy
 
+from ..core.conventions import ACTIVE
 from ..core.errors import GridlightError
+from ..core.field import Field
 from ..core.snapshot import SceneSnapshot
 from ..scene.notices import Notices
 from ..scene.read import read_lights, read_scene
 from ..scene.world import read_world
 from .changes import FIELDS, LIGHTS, SURFACES, WORLD
 from .gpu_scene import GpuScene
-from .live import Readout
+from .live_bake import LiveBake
+from .readout import Readout
 
 _PATIENCE = 3.0  # times the duration of a read: how long a scene must stand still before it is read again
 _QUICK_SECONDS = 0.03  # a read this short may happen in every frame
@@ -34,10 +38,13 @@ class SceneSession:
         self.message = ""  # why there is nothing to see
         self.shown_settings: tuple = ()
         self.readout = Readout()
+        self._live = LiveBake()
+        self._live_fields: dict[str, Field] = {}  # what it found since the last bake was stored
         self.gpu: GpuScene | None = None  # None before the first read, and for scenes without surface
         self.snapshot: SceneSnapshot | None = None
         self._pending = {SURFACES}
         self._changed_at = 0.0
+        self._light_is_old = False
         self._read_seconds = 0.0
 
     @property
@@ -53,6 +60,7 @@ class SceneSession:
             self._changed_at = time.perf_counter()
             if kinds - {FIELDS}:
                 self.readout.changed()
+                self._light_is_old = True
 
     @property
     def is_pending(self) -> bool:
@@ -67,20 +75,55 @@ class SceneSession:
         if slow and self.gpu is not None and still < _PATIENCE * self._read_seconds:
             return
         kinds, self._pending = self._pending, set()
+        if FIELDS in kinds:
+            self._live_fields = {}
         try:
             if SURFACES in kinds or self.gpu is None:
                 self._read_everything(scene, view_layer)
             else:
-                if LIGHTS in kinds:
-                    self.gpu.set_lights(read_lights(scene, view_layer))
-                if WORLD in kinds:
-                    self.gpu.set_world(read_world(scene, Notices()))
-                if FIELDS in kinds:
-                    self.gpu.load_fields(scene)
+                self._read_part(kinds, scene, view_layer)
             self.message = "" if self.gpu else "no surface to show: add a mesh"
         except (GridlightError, RuntimeError) as error:  # unreadable field or scene, or Blender is rendering
             self.message = str(error)
         self.version += 1
+
+    def relight(self, scene: bpy.types.Scene, budget_seconds: float) -> None:
+        """Lets the light of volumes that were baked follow what changed since, for about ``budget_seconds``."""
+        if self.gpu is None or not self.gpu.fields or self._pending:
+            return
+        if self._light_is_old and not self._live.is_waiting:
+            grids = [item.field.grid for item in self.gpu.fields.values()]
+            self._live.follow(self.snapshot, grids, scene.gridlight.bake_settings())
+            self._light_is_old = False
+        if not self._live.is_working:
+            return
+        self.readout.worked()
+        fields = self._live.step(budget_seconds)
+        if self._live.message:
+            self.message = self._live.message
+        if fields:
+            self._live_fields = fields
+            self.gpu.show_fields(fields)
+            probes = sum(int((field.state == ACTIVE).sum()) for field in fields.values())
+            self.readout.relit(probes, up_to_date=not (self._live.is_working or self._light_is_old))
+            self.version += 1
+
+    @property
+    def is_relighting(self) -> bool:
+        """Whether ``relight`` has something to do."""
+        return self.gpu is not None and bool(self.gpu.fields) and (self._live.is_working or self._light_is_old)
+
+    def _read_part(self, kinds: set[str], scene, view_layer) -> None:
+        if LIGHTS in kinds:
+            self.snapshot = replace(self.snapshot, lights=read_lights(scene, view_layer))
+            self.gpu.set_lights(self.snapshot.lights)
+        if WORLD in kinds:
+            self.snapshot = replace(self.snapshot, world=read_world(scene, Notices()))
+            self.gpu.set_world(self.snapshot.world)
+        if FIELDS in kinds:
+            self.gpu.load_fields(scene)
+            self._light_is_old = False
+            self.readout.relit(0, up_to_date=True)
 
     def _read_everything(self, scene, view_layer) -> None:
         started = time.perf_counter()
@@ -88,6 +131,9 @@ class SceneSession:
         self.snapshot = read_scene(scene, view_layer, live=True)
         if len(self.snapshot.triangles):
             self.gpu = GpuScene(scene, self.snapshot)
+            kept = {name: field for name, field in self._live_fields.items() if name in self.gpu.fields}
+            if kept:
+                self.gpu.show_fields(kept)
         self._read_seconds = time.perf_counter() - started
 
 

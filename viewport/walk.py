@@ -22,12 +22,15 @@ class Walker:
         self._lens = space.lens
         self._was_camera = region_3d.view_perspective == "CAMERA"
         self.speed = speed
-        to_world = region_3d.view_matrix.inverted()
-        if self._was_camera and space.camera and space.camera.type == "CAMERA":
-            space.lens = space.camera.data.lens * VIEW_SENSOR_MM / space.camera.data.sensor_width
-        forward = -to_world.col[2].xyz.normalized()
-        self.eye = to_world.translation.copy()
-        if not region_3d.is_perspective:
+        camera = space.camera if self._was_camera else None
+        if camera is not None:
+            to_world = camera.matrix_world.normalized()
+            forward = -to_world.col[2].xyz
+            self.eye = to_world.translation.copy()
+            if camera.type == "CAMERA":
+                space.lens = camera.data.lens * VIEW_SENSOR_MM / camera.data.sensor_width
+        else:  # not from the view's matrix, which is as old as the last redraw
+            forward = region_3d.view_rotation @ Vector((0.0, 0.0, -1.0))
             self.eye = region_3d.view_location - forward * region_3d.view_distance
         self.heading = math.atan2(-forward.x, forward.y)
         self.pitch = math.asin(max(-1.0, min(1.0, forward.z)))

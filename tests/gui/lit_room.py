@@ -12,6 +12,7 @@ def build(person, radiance=RADIANCE, lamp=False):
     """A 6 m cube seen from inside, with a uniform field: every surface shows albedo × radiance of indirect light."""
     volumes = person.module("scene.volumes")
     person.module("viewport.view_images").SAMPLES = 4  # enough for plain colours
+    bpy.context.scene.gridlight.preview.live = False  # the light shall stay as it is known
     cube = bpy.data.objects["Cube"]
     cube.scale = (3, 3, 3)
     cube.active_material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (*ALBEDO, 1)

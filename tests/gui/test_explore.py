@@ -83,7 +83,8 @@ def test_lights_walls_animation_exposure_probes_and_screenshots(person):
     scene, preview = bpy.context.scene, bpy.context.scene.gridlight.preview
     explore = yield from enter(person)
     yield from lit_room.drawn(person)
-    for down, up, group in (("1", "2", "CEILING_1"), ("3", "4", "CEILING_2"), ("5", "6", "WALL"), ("7", "8", "DYNAMIC")):
+    keys = {"CEILING_1": ("1", "2"), "CEILING_2": ("3", "4"), "WALL": ("5", "6"), "DYNAMIC": ("7", "8")}
+    for group, (down, up) in keys.items():
         light = lamps[group].gridlight_light
         yield from person.key(up)
         assert abs(light.intensity - 2**0.5) < 1e-3, (group, light.intensity)
@@ -107,7 +108,6 @@ def test_lights_walls_animation_exposure_probes_and_screenshots(person):
     assert preview.show_probes
     yield from lit_room.drawn(person)
     person.picture("probes")
-    before = {path for path in Path("/tmp").glob("gridlight_*.png")}
     folder = Path(person.module("operators.explore_actions").screenshot_path()).parent
     before = set(folder.glob("*.png"))
     yield from person.key("F9")

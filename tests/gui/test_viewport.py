@@ -249,3 +249,34 @@ def test_lights_that_move_are_noticed(person):
     yield 1.0
     assert session.gpu is gpu_scene, "a selection is no change of the scene"
     switch(person, enabled=False)
+
+
+@in_blender(timeout=240.0)
+def test_light_follows_a_lamp_that_moves(person):
+    """Indirect light, which only probes carry, comes from where the lamp is, a slice in every frame."""
+    volume = lit_room.build(person, radiance=0.0, lamp=True)
+    lamp = bpy.data.objects["Light"]
+    lamp.location, lamp.data.energy, lamp.data.shadow_soft_size = (2.0, 0.0, 0.0), 300, 0.1
+    preview = switch(person, enabled=True, mode="INDIRECT", live=True, show_rate=True, frame_budget_ms=100.0)
+    lit_room.view(person, distance=0.1, rotation=(1, 0, 0, 0))  # straight down, +x to the right
+    session_module = person.module("viewport.sessions")
+    yield from person.wait_until(lambda: session_module.existing() and session_module.existing()[0].gpu, "the scene")
+    session = session_module.existing()[0]
+    assert not session.is_relighting, "light is baked although nothing changed since the bake"
+    seen = {}
+    for side in (-1.0, 1.0):
+        lamp.location.x = 2.5 * side
+        yield 0.2
+        assert session.is_relighting or session.is_pending
+        yield from person.wait_until(lambda: not (session.is_relighting or session.is_pending), "new light", 90.0)
+        yield from lit_room.drawn(person)
+        person.picture(f"lamp{side:+.0f}")
+        seen[side] = lit_room.middle(person, share=0.8).mean(axis=(0, 2))
+        assert session.readout.probes_per_frame > 0 and session.readout.age_seconds == 0
+    third = len(seen[1.0]) // 3
+    for side, brightness in seen.items():
+        left, right = brightness[:third].mean(), brightness[-third:].mean()
+        assert (right > left + 3) if side > 0 else (left > right + 3), (side, left, right)
+    stored = person.module("scene.field_storage").load_field(volume)
+    assert not stored.coefficients.any(), "what was baked and stored is not changed by looking"
+    preview.enabled, preview.show_rate = False, False

@@ -1,20 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light that follows changes while one looks: what a view asks of whatever computes it, and the pace."""
+"""How fast views are drawn, and how well the light keeps up with the scene."""
 
 from __future__ import annotations
 
 import time
-from typing import Protocol
-
-
-class Updater(Protocol):
-    """Keeps the light of one scene up to date in slices."""
-
-    def mark_changed(self, kind: str) -> None:
-        """Something of this kind (see ``changes``) is new in the scene that the updater was given."""
-
-    def step(self, budget_seconds: float) -> int:
-        """Works for about ``budget_seconds`` and returns how many probes have new light; 0 when all is done."""
 
 
 class Readout:
@@ -23,6 +12,7 @@ class Readout:
     def __init__(self):
         self._frames: list[float] = []
         self.probes_per_frame = 0
+        self._slices = 0
         self._oldest_change: float | None = None
 
     def frame(self) -> None:
@@ -36,9 +26,15 @@ class Readout:
         if self._oldest_change is None:
             self._oldest_change = time.perf_counter()
 
-    def stepped(self, probes: int, finished: bool) -> None:
-        self.probes_per_frame = probes
-        if finished:
+    def worked(self) -> None:
+        """A slice of a relight has been done."""
+        self._slices += 1
+
+    def relit(self, probes: int, up_to_date: bool) -> None:
+        """``probes`` have new light; ``up_to_date`` if nothing has changed since that began."""
+        self.probes_per_frame = round(probes / max(self._slices, 1))
+        self._slices = 0
+        if up_to_date:
             self._oldest_change = None
 
     @property
