@@ -16,6 +16,7 @@ from .orientation import inside_solid
 _LEAST_BEHIND = 0.25  # share of back faces, or of background, in sight of a probe that stands in or behind a wall
 _REACH = 0.5  # cells
 _MARGIN = 0.05  # cells between a moved probe and the surface it came through
+_ALIKE = 1e-3  # relative difference of costs that tells nothing
 _OUTWARD_PENALTY = 0.5  # how much farther than inwards the way out of the volume counts
 
 
@@ -45,6 +46,7 @@ def moves(grid: Grid, positions: np.ndarray, exits: np.ndarray) -> np.ndarray:
     inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), 1e-20)
     cost = length * (1.0 + _OUTWARD_PENALTY * (1.0 - np.einsum("lfi,li->lf", direction, inward)))
     cost = np.where(near, cost, np.inf)
-    best = cost.argmin(axis=1)
+    # Of ways that are alike the first one: rounding must not decide where a probe stands.
+    best = (cost <= (1.0 + _ALIKE) * cost.min(axis=1, keepdims=True)).argmax(axis=1)
     row = np.arange(len(positions))
     return np.where(np.isfinite(cost[row, best])[:, None], step[row, best], 0.0)

@@ -102,13 +102,15 @@ class MaterialTable:
             verdict = "opaque" if opacity.number() >= threshold else "invisible"
             self._notices.group(f"partial transparency is not supported: clipped at {threshold:g}, so {verdict}", name)
 
+        if np.any(emission.scale < 0):
+            self._notices.group("materials of negative emission take light away, as in Cycles", name)
         base_image, alpha_image = self._base_images(name, diffuse, opacity)
         self.domains.append(domain)
         self.materials.append(
             Material(
                 name=name,
                 base_color=_color(diffuse),
-                emission=_color(emission),
+                emission=tuple(float(channel) for channel in np.broadcast_to(emission.scale, 3)),
                 base_image=base_image,
                 alpha_image=alpha_image,
                 emission_image=NO_IMAGE if emission.is_constant else self._add(f"{name} emission", emission, None),
@@ -176,7 +178,7 @@ def _solid_where_opaque(opacity: Value, threshold: float) -> Value:
 
 
 def _color(value: Value) -> tuple[float, float, float]:
-    """The constant factor of a colour; negative reflectances and emissions do not exist on a surface."""
+    """The constant factor of a colour; negative reflectances do not exist on a surface."""
     return tuple(float(channel) for channel in np.maximum(np.broadcast_to(value.scale, 3), 0.0))
 
 
