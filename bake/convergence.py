@@ -40,7 +40,8 @@ class Convergence:
         """Takes |field|², |change|² and change · last change of one iteration. Returns the factor to extrapolate by, 0
         for none.
 
-        The first iteration gathers direct light and emission, each further one is a bounce.
+        The first iteration is direct light and may be dark: what glows and the world arrive with the first bounce.
+        Each further one is a bounce.
         """
         self.iterations += 1
         self._lengths.append(math.sqrt(change))
@@ -60,7 +61,7 @@ class Convergence:
                 f"stopped after the {self._bounces} bounces asked for, "
                 f"an estimated {self.missing:.2g} of the light is missing"
             )
-        elif self.missing < self._tolerance and (last_missing < self._tolerance or relative < _ROUNDING):
+        elif bounces and self.missing < self._tolerance and (last_missing < self._tolerance or relative < _ROUNDING):
             self.done = self.converged = True
             self.reason = (
                 f"converged after {self.iterations} iterations: an estimated {self.missing:.2g} "

@@ -23,6 +23,7 @@ _GROUP = 64
 _GROUPS_IN_ROW = 2**21 // _GROUP  # as LINEAR_THREAD counts
 _RAYS_AT_ONCE = 1 << 20
 _COARSEST = 3  # levels by which patches grow that only rays see
+_UNSEEN = 1e-6  # weight of patches that no probe sees where iterations are compared: light may still be on its way
 _MOST_ROUNDS = 12  # of rays that find surface which nothing has seen before
 
 
@@ -160,7 +161,7 @@ class PatchLight:
         self._ends = upload(_fours(np.concatenate(ends)), "rays")
         self._brought = upload(np.concatenate(brought), "patches")
         self._reflected = upload(np.concatenate(reflected), "rays")
-        self._seen = upload(_fours(self.patches.seen), "patches")
+        self._seen = upload(_fours(np.where(self.patches.seen, 1.0, _UNSEEN)), "patches")
         self._irradiance = [allocate(self.count, "patches") for _ in range(3)]
 
     def _bind_ends(self, hits: gpu.types.GPUTexture, count: int, round_: int) -> np.ndarray:

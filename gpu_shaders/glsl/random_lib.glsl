@@ -24,11 +24,11 @@ vec2 sample_r2(uvec3 key, int index)
   return vec2(place >> 8u) * (1.0 / 16777216.0);
 }
 
-/* Three numbers in [0, 1) from the three-dimensional sequence. */
+/* Three numbers in [0, 1) by the same rule from the three-dimensional sequence. */
 vec3 sample_r3(uvec3 key, int index)
 {
-  vec3 start = vec3(pcg3d(key) >> 8u) * (1.0 / 16777216.0);
-  return fract(start + vec3(0.8191725133961645, 0.6710436067037893, 0.5497004779019703) * float(index));
+  uvec3 place = pcg3d(key) + uvec3(3518319155u, 2882110345u, 2360945575u) * uint(index);
+  return vec3(place >> 8u) * (1.0 / 16777216.0);
 }
 
 vec2 sample_disk(vec2 u)

@@ -70,6 +70,19 @@ def test_light_that_grows_stops_too():
     assert watch.done and not watch.converged
 
 
+@pytest.mark.parametrize("ratio", [0.0, 0.5, 0.9])
+def test_light_that_arrives_with_the_first_bounce(ratio):
+    """What glows and the world are brought along by rays: the first iteration is dark, and that is no end."""
+    watch = Convergence(None, 2e-3)
+    older = old = 0.0
+    while not watch.done:
+        new = 1.0 + ratio * old if watch.iterations else 0.0
+        factor = watch.add(new * new, (new - old) ** 2, (new - old) * (old - older))
+        older, old = old, new + factor * (new - old)
+    assert watch.converged and watch.iterations > 1
+    assert old * (1 - ratio) == pytest.approx(1, rel=2e-3)
+
+
 def test_no_light_at_all():
     state, watch = run(np.array([[0.5]]), np.array([0.0]))
     assert watch.converged and state[0] == 0
