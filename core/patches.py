@@ -24,7 +24,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .cubemap import unpack_normal
 from .grid import Grid
 
 POINTS = 16  # places of a patch where light is measured
@@ -67,8 +66,8 @@ class Patches:
     def __init__(self, grid: Grid):
         spacing = grid.cell_size()
         self.cell = min(_CELL_SHARE * float(np.exp(np.log(spacing).mean())), float(np.linalg.norm(grid.matrix[:3, :3] * 2)) / _LEAST_CELLS)
-        self._to_box = np.linalg.inv(grid.matrix[:3, :3])
-        self._half = np.linalg.norm(grid.matrix[:3, :3], axis=0)
+        self._to_box = np.linalg.inv(grid.matrix[:3, :3]).astype(np.float32)
+        self._half = np.linalg.norm(grid.matrix[:3, :3], axis=0).astype(np.float32)
         self._keys = [np.zeros(0, np.uint64) for _ in range(_VARIANTS)]  # sorted
         self._ids = [np.zeros(0, np.int64) for _ in range(_VARIANTS)]
         self.points = np.zeros((0, POINTS, 4), np.float32)
@@ -118,19 +117,19 @@ class Patches:
 
     def _cell_keys(self, hits: np.ndarray, view_distance: np.ndarray | None, coarser: int) -> np.ndarray:
         """(H,) uint64: size, place and facing of the cell that each of ``hits`` lies in."""
-        position = hits[:, :3].astype(np.float64)
-        beyond = np.maximum(np.abs(position @ self._to_box.T) - 1.0, 0.0) * self._half
-        wanted = np.maximum(0.5 * ANGLE / self.cell * np.sqrt((beyond**2).sum(axis=1)), 1.0)
+        # Columns in float32: bakes bind millions of hits, and only borders of cells move by rounding.
+        position = np.ascontiguousarray(hits[:, :3].T)
+        beyond = np.maximum(np.abs(self._to_box @ position) - 1, 0) * self._half[:, None]
+        wanted = np.maximum(np.float32(0.5 * ANGLE / self.cell) * np.sqrt((beyond * beyond).sum(axis=0)), 1)
         if view_distance is not None:
-            wanted = np.minimum(wanted, np.maximum(ANGLE / self.cell * view_distance, 2.0**_FINEST))
-        level = np.floor(np.log2(wanted)).astype(np.int64) + coarser
-        place = np.floor(position / (self.cell * 2.0**level)[:, None] + _SHIFT).astype(np.int64)
-        place &= (1 << _AXIS_BITS) - 1
-        normal = unpack_normal(hits[:, 3].astype(np.float64))
-        facing = np.rint(normal / np.abs(normal).max(axis=1, keepdims=True)).astype(np.int64) + 1  # 26 directions
-        key = ((level + 16) * 27 + facing @ np.array([9, 3, 1])).astype(np.uint64)
+            wanted = np.minimum(wanted, np.float32(ANGLE / self.cell) * view_distance.astype(np.float32))
+            wanted = np.maximum(wanted, np.float32(2.0**_FINEST))
+        level = np.frexp(wanted)[1] - 1 + coarser  # ⌊log2⌋
+        place = np.floor(position * np.ldexp(np.float32(1 / self.cell), -level) + np.float32(_SHIFT))
+        key = ((level + 16) * 27 + _facing(hits[:, 3])).astype(np.uint64)
         for axis in range(3):
-            key = (key << np.uint64(_AXIS_BITS)) | place[:, axis].astype(np.uint64)
+            inside = place[axis].astype(np.int32) & ((1 << _AXIS_BITS) - 1)
+            key = (key << np.uint64(_AXIS_BITS)) | inside.astype(np.uint64)
         return key
 
     def _known(self, variant: int, unique: np.ndarray) -> np.ndarray:
@@ -164,3 +163,16 @@ class Patches:
         start = np.cumsum(count) - count
         chosen = start[:, None] + np.arange(POINTS) * count[:, None] // POINTS
         self.points[first_new:] = hits[member[chosen]]
+
+
+def _facing(packed: np.ndarray) -> np.ndarray:
+    """(H,) number 0..26 of the one among 26 directions (axes, edges and corners of a cube) that is nearest to packed
+    normals (H,)."""
+    high = np.floor(packed / np.float32(4096))
+    u = (packed - np.float32(4096) * high - 2048) / np.float32(2047)
+    v = (high - 2048) / np.float32(2047)
+    z = 1 - np.abs(u) - np.abs(v)
+    fold = np.maximum(-z, 0)
+    x, y = u - np.copysign(fold, u), v - np.copysign(fold, v)
+    most = np.maximum(np.maximum(np.abs(x), np.abs(y)), np.abs(z))
+    return (9 * np.rint(x / most) + 3 * np.rint(y / most) + np.rint(z / most)).astype(np.int32) + 13

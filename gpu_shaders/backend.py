@@ -27,7 +27,7 @@ from .scene_textures import SceneTextures
 from .textures import allocate, layers, read, upload
 
 _GROUP = 64  # threads that share a probe where its texels are summed
-_EMITTER_POINTS = 8192  # that each probe considers besides its texels
+_EMITTER_POINTS = 4096  # that each probe considers besides its texels
 _EMITTER_RAYS = 512  # that it sends to them
 # Kept images of texel surfaces. Albedo is 32 bit: in a bright room an error of 1e-4 in 0.99 is one of 1e-2 in the
 # light.

@@ -97,7 +97,7 @@ def surface_resolve_comp(info, defines):
 
 def object_sightings_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
-    slot = _samplers(info, "patch_irradiance")
+    slot = _samplers(info, "patch_irradiance", "triangle_attributes")
     _samplers(info, "geometry", "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "sightings")
     info.local_group_size(96, 1, 1)
@@ -116,7 +116,7 @@ def probe_exits_comp(info, defines):
 def probe_statistics_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
     info.define("DEPTH_EDGE", str(DEPTH_EDGE))
-    slot = _samplers(info, "texel_weights", "shells", "patch_irradiance")
+    slot = _samplers(info, "texel_weights", "shells", "patch_irradiance", "triangle_attributes")
     _samplers(info, "geometry", "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "depth_moments", pixel="RG32F")
     _image(info, 1, "probe_shares")
@@ -146,7 +146,7 @@ def field_project_comp(info, defines):
     slot = _samplers(info, "texel_weights", "patch_irradiance")
     _samplers(info, "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "field")
-    _ints(info, "first_slot", "first_layer")
+    _ints(info, "first_slot", "first_layer", "own_texels")
     info.local_group_size(int(defines["GROUP"]), 1, 1)
     return {
         "compute": ["data_lib", "octahedral_lib", "cubemap_lib", "spherical_harmonics_lib", "texel_light_lib", "field_project_comp"]

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from .create_infos import _image, _ints, _samplers
+from .create_infos import NO_SURFACE, _image, _ints, _samplers, _scene
 
 
 def probe_reach_comp(info, defines):
@@ -21,3 +21,25 @@ def scatter_comp(info, defines):
     _ints(info, "value_count")
     info.local_group_size(64, 1, 1)
     return {"compute": ["data_lib", "scatter_comp"]}
+
+
+def surface_again_comp(info, defines):
+    info.define("NO_SURFACE", NO_SURFACE)
+    slot = _scene(info, defines)
+    _samplers(info, "probe_slots", "world_texels", *(["new_numbers"] if "RENUMBER" in defines else []), first=slot)
+    _image(info, 0, "geometry", layered=True, access="READ+WRITE")
+    _image(info, 1, "albedo", layered=True, access="READ+WRITE")
+    _image(info, 2, "emission", layered=True)
+    _image(info, 3, "rebind", pixel="R32F")
+    _ints(info, "first_slot")
+    info.local_group_size(8, 8, 1)
+    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", "surface_lib", "surface_again_comp"]}
+
+
+def layers_move_comp(info, defines):
+    slot = _samplers(info, "from_layer")
+    _samplers(info, "old_geometry", "old_albedo", "old_emission", kind="FLOAT_2D_ARRAY", first=slot)
+    for number, name in enumerate(("geometry", "albedo", "emission")):
+        _image(info, number, name, layered=True)
+    info.local_group_size(8, 8, 1)
+    return {"compute": ["data_lib", "layers_move_comp"]}

@@ -11,6 +11,7 @@
 
 SHARED_ vec4 partial_sums[COEFFICIENTS * GROUP];
 SHARED_ float run_weights[GROUP];
+SHARED_ float candidate_weights[CANDIDATE_COUNT];
 
 const int RUN = CANDIDATE_COUNT / GROUP;
 
@@ -75,7 +76,9 @@ void main()
   uvec3 key = uvec3(uint(slot.w), 0xB5297A4Du, uint(seed));
   float run_weight = 0.0;
   for (int i = 0; i < RUN; i++) {
-    run_weight += candidate(slot.xyz, key, lane * RUN + i).weight;
+    float weight = candidate(slot.xyz, key, lane * RUN + i).weight;
+    candidate_weights[lane * RUN + i] = weight;
+    run_weight += weight;
   }
   run_weights[lane] = run_weight;
   barrier();
@@ -86,11 +89,14 @@ void main()
   }
   float step = total / float(samples);
   for (int i = 0; i < RUN && total > 0.0; i++) {
-    Candidate chosen = candidate(slot.xyz, key, lane * RUN + i);
-    float after = before + chosen.weight;
+    float after = before + candidate_weights[lane * RUN + i];
     float rays = floor(after / step + 0.5) - floor(before / step + 0.5);
     before = after;
-    if (rays > 0.0 && !trace_any(slot.xyz, chosen.direction, chosen.distance * 0.9999)) {
+    if (rays == 0.0) {
+      continue;
+    }
+    Candidate chosen = candidate(slot.xyz, key, lane * RUN + i);
+    if (!trace_any(slot.xyz, chosen.direction, chosen.distance * 0.9999)) {
       sh_basis(chosen.direction, basis);
       for (int c = 0; c < COEFFICIENTS; c++) {
         sum[c] += chosen.radiance * (basis[c] * rays * step / chosen.weight);

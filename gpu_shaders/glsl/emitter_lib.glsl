@@ -137,20 +137,16 @@ vec3 emitter_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int ind
          emitter_direction_irradiance(origin, normal, key, index);
 }
 
-/* Irradiance of a point on the emitters if nothing stood between, near ones cut off as by directions. */
-vec3 emitters_unshadowed(vec3 point, vec3 normal, uvec3 key, int index)
+/* Irradiance by one point on the emitters if nothing stood between. */
+vec3 emitter_unshadowed(vec3 point, vec3 normal, uvec3 key, int index)
 {
-  vec3 sum = vec3(0.0);
-  for (int i = 0; i < CANDIDATES; i++) {
-    EmitterSample emitter = sample_emitter(sample_r3(key, index * CANDIDATES + i));
-    vec3 offset = emitter.point - point;
-    float squared = max(dot(offset, offset), 1.0e-20);
-    float distance = sqrt(squared);
-    vec3 direction = offset / distance;
-    float surface_cosine = max(dot(direction, normal), 0.0);
-    float emitter_cosine = abs(dot(direction, emitter.normal));
-    sum += emitter.radiance * (surface_cosine * emitter_cosine / (squared * emitter.density) *
-                               point_share(emitter.density, distance, surface_cosine, emitter_cosine));
-  }
-  return sum / float(CANDIDATES);
+  EmitterSample emitter = sample_emitter(sample_r3(key, index));
+  vec3 offset = emitter.point - point;
+  float squared = max(dot(offset, offset), 1.0e-20);
+  float distance = sqrt(squared);
+  vec3 direction = offset / distance;
+  float surface_cosine = max(dot(direction, normal), 0.0);
+  float emitter_cosine = abs(dot(direction, emitter.normal));
+  return emitter.radiance * (surface_cosine * emitter_cosine / (squared * emitter.density) *
+                             point_share(emitter.density, distance, surface_cosine, emitter_cosine));
 }

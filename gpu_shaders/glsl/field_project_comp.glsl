@@ -1,5 +1,6 @@
 /* Outgoing radiance of every texel (emission that is not sampled + albedo/π · irradiance of its patch) and its projection to SH.
  *
+ * With own_texels the irradiance of texel i of the dispatch's probe p is element p · 6 · FACE² + i.
  * Dispatch: one group of GROUP threads a probe. Threads take texels in strides, then each coefficient is summed over the threads in
  * fixed order, so two runs give the same bytes. Reference: core/reference_bake.py.
  */
@@ -18,7 +19,8 @@ void main()
   for (int i = lane; i < 6 * FACE * FACE; i += GROUP) {
     ivec3 at = ivec3(i % FACE, i / FACE, layer);
     vec4 emitted = texelFetch(emission, at, 0);
-    vec3 radiance = texel_reflected(at) * 0.3183098861837907 + (emitted.a == 0.0 ? emitted.rgb : vec3(0.0));
+    int own = own_texels != 0 ? probe * 6 * FACE * FACE + i : -1;
+    vec3 radiance = texel_reflected(at, own) * 0.3183098861837907 + (emitted.a == 0.0 ? emitted.rgb : vec3(0.0));
     float basis[COEFFICIENTS];
     sh_basis(texel_direction(at.xy), basis);
     radiance *= element(texel_weights, (at.y % FACE) * FACE + at.x).x;

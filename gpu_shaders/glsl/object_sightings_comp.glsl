@@ -17,8 +17,9 @@ void main()
     ivec3 at = ivec3(texel.x, face * FACE + texel.y, probe);
     vec4 seen = texelFetch(geometry, at, 0);
     if (seen.z < NO_SURFACE) {
-      vec3 light = texelFetch(emission, at, 0).rgb + texel_reflected(at);
-      float value = seen.w + 1.0 + (light != vec3(0.0) ? 0.5 : 0.0);
+      vec3 light = texelFetch(emission, at, 0).rgb + texel_reflected(at, -1);
+      float object = element(triangle_attributes, 5 * int(seen.w) + 1).w;
+      float value = object + 1.0 + (light != vec3(0.0) ? 0.5 : 0.0);
       sighting[i] = seen.z < 0.0 ? -value : value;
     }
   }

@@ -18,7 +18,7 @@ void main()
     vec4 at = element(patch_points, POINTS * patch_index + i);
     vec3 irradiance = lamps_unshadowed(at.xyz, unpack_normal(at.w), key, i);
 #ifdef HAS_EMITTERS
-    irradiance += emitters_unshadowed(at.xyz, unpack_normal(at.w), key, i);
+    irradiance += emitter_unshadowed(at.xyz, unpack_normal(at.w), key, i);
 #endif
     float luminance = dot(irradiance, vec3(0.2126, 0.7152, 0.0722));
     sum += luminance;

@@ -45,9 +45,10 @@ void main()
     }
     else if (seen.x < 0.0) {
       share.w += weight;
-      share.x += element(shells, int(seen.y)).x == 0.0 ? weight : 0.0;
+      float object = element(triangle_attributes, 5 * int(seen.y) + 1).w;
+      share.x += element(shells, int(object)).x == 0.0 ? weight : 0.0;
     }
-    vec3 light = texelFetch(emission, at, 0).rgb + texel_reflected(at);
+    vec3 light = texelFetch(emission, at, 0).rgb + texel_reflected(at, -1);
     share.z += light != vec3(0.0) ? weight : 0.0;
   }
   partial_shares[lane] = share;

@@ -2,9 +2,8 @@
  *
  * Dispatch: x = columns, y = 6·FACE rows, z = probes; groups of 8×8×1. Reads layer probe·6 + face of `hits`, writes layer
  * first_layer + probe of:
- *   geometry  octahedral normal, signed distance (negative: back face; NO_SURFACE: background), object;
- *             lookup_weights_comp later puts the lookup's first node in place of the object
- *   albedo    diffuse albedo
+ *   geometry  octahedral normal, signed distance (negative: back face; NO_SURFACE: background), triangle
+ *   albedo    diffuse albedo; texel_patches_comp later adds the patch
  *   emission  emitted radiance, density where it is sampled as a light, 0 where the field carries it; the world's radiance where the texel sees background
  */
 
@@ -27,7 +26,7 @@ void main()
   vec3 direction = texel_direction(id.xy);
   Surface surface = resolve_surface(int(hit.x), hit.yz, origin, direction, 2.0 / float(FACE));
   float distance = max(dot(surface.position - origin, direction), 1.0e-20);
-  imageStore(geometry, target, vec4(octahedral_encode(surface.normal), surface.back ? -distance : distance, float(surface.object)));
+  imageStore(geometry, target, vec4(octahedral_encode(surface.normal), surface.back ? -distance : distance, hit.x));
   imageStore(albedo, target, vec4(surface.albedo, 0.0));
   imageStore(emission, target, vec4(surface.emission, surface.emitter_density));
 }

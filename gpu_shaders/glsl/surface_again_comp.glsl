@@ -1,0 +1,46 @@
+/* Albedo and emission of texels anew, from the triangles that they hit before: for other materials, another world, or triangles
+ * with other numbers. No ray is traced.
+ *
+ * Dispatch: x = columns, y = 6·FACE rows, z = probes; groups of 8×8×1; layer = probe. With RENUMBER, new_numbers holds the new number of each
+ * old triangle, −1 where it is gone (its texels are to be captured again). Writes 1 to `rebind` if a texel that reflected nothing now
+ * does, or the other way round: then patches must be found anew.
+ */
+
+vec2 barycentric_of(int triangle, vec3 point)
+{
+  vec3 a = element(triangle_corners, 3 * triangle).xyz;
+  vec3 ab = element(triangle_corners, 3 * triangle + 1).xyz - a;
+  vec3 ac = element(triangle_corners, 3 * triangle + 2).xyz - a;
+  vec3 across = cross(ab, ac);
+  return vec2(dot(cross(point - a, ac), across), dot(cross(ab, point - a), across)) / dot(across, across);
+}
+
+void main()
+{
+  ivec3 at = ivec3(gl_GlobalInvocationID);
+  if (at.x >= FACE || at.y >= 6 * FACE) {
+    return;
+  }
+  vec4 seen = imageLoad(geometry, at);
+  if (seen.z >= NO_SURFACE) {
+    imageStore(emission, at, vec4(element(world_texels, at.y * FACE + at.x).rgb, 0.0));
+    return;
+  }
+#ifdef RENUMBER
+  seen.w = element(new_numbers, int(seen.w)).x;
+  if (seen.w < 0.0) {
+    return;
+  }
+  imageStore(geometry, at, seen);
+#endif
+  vec3 origin = element(probe_slots, first_slot + at.z).xyz;
+  vec3 direction = texel_direction(at.xy);
+  vec2 barycentric = barycentric_of(int(seen.w), origin + direction * abs(seen.z));
+  Surface surface = resolve_surface(int(seen.w), barycentric, origin, direction, 2.0 / float(FACE));
+  vec4 reflects = imageLoad(albedo, at);
+  if ((reflects.rgb != vec3(0.0)) != (surface.albedo != vec3(0.0))) {
+    imageStore(rebind, ivec2(0), vec4(1.0));
+  }
+  imageStore(albedo, at, vec4(surface.albedo, reflects.w));
+  imageStore(emission, at, vec4(surface.emission, surface.emitter_density));
+}
