@@ -4,9 +4,12 @@
 Chromium and npm are needed. Where one is missing the tests fail and say what installs it; they are never skipped.
 """
 
+import contextlib
 import http.server
 import json
+import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -111,14 +114,15 @@ def browse(packages):
                 options = [f"--screenshot={screenshot}", "--window-size=1280,720", "--virtual-time-budget=30000"]
                 command[1:1] = options
             log = tempfile.TemporaryFile(dir=profile)
-            process = subprocess.Popen(command, stdout=log, stderr=log)
+            process = subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True)
             try:
                 if screenshot:
                     process.wait(timeout=120)
                 else:
                     server.arrived.wait(timeout=120)
             finally:
-                process.kill()
+                with contextlib.suppress(ProcessLookupError):  # it ended by itself, its children with it
+                    os.killpg(process.pid, signal.SIGKILL)
                 process.wait()
                 server.shutdown()
                 server.server_close()
