@@ -17,6 +17,7 @@ from ..core.conventions import DEPTH_EDGE
 from ..core.cubemap import texel_solid_angles
 from ..core.emitters import sampling_density
 from ..core.grid import Grid
+from ..core.scene_changes import SceneChanges
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..core.world_map import world_texels
@@ -72,10 +73,8 @@ class GpuBackend:
         weights = np.zeros((self.face * self.face, 4), np.float32)
         weights[:, 0] = texel_solid_angles(self.face).ravel()
         self._texel_weights = upload(weights, "texels")
-        background = np.zeros((6 * self.face**2, 4), np.float32)
-        background[:, :3] = world_texels(snapshot.world, self.face).reshape(-1, 3)
-        self._world_texels = upload(background, "texels")
-        self.light = PatchLight(self.scene, grid, settings, self._world_texels)
+        self._send_world(snapshot)
+        self.forget_patches()
         layer_limit = gpu.capabilities.max_texture_layers_get()
         texels = 6 * self.face**2
         budget = settings.memory_mib << 20
@@ -84,6 +83,22 @@ class GpuBackend:
         self.probes_in_budget = max(1, budget // (texels * BYTES_PER_TEXEL))
         self._hits = None
         self._raster = None
+
+    def _send_world(self, snapshot: SceneSnapshot) -> None:
+        background = np.zeros((6 * self.face**2, 4), np.float32)
+        background[:, :3] = world_texels(snapshot.world, self.face).reshape(-1, 3)
+        self.world_texels = upload(background, "texels")
+
+    def update(self, snapshot: SceneSnapshot, changes: SceneChanges) -> str:
+        """Brings the scene to ``snapshot``; texel surfaces and patches stay what they are. Returns what became of the
+        hierarchy, see SceneTextures.update."""
+        hierarchy = self.scene.update(snapshot, changes, sampling_density(snapshot, self.grid))
+        if changes.shape:
+            self._raster = None  # it knows where triangles lie
+            self.object_count = max(len(snapshot.object_names), 1)
+        if changes.world:
+            self._send_world(snapshot)
+        return hierarchy
 
     # Probes
     # -----------------------------------------------------------------------------------------------------------------
@@ -95,7 +110,7 @@ class GpuBackend:
         slots = np.zeros((len(nodes), 4), np.float32)
         slots[:, :3] = self._positions
         slots[:, 3] = nodes
-        self._probe_slots = upload(slots, "probes")
+        self.probe_slots = upload(slots, "probes")
 
     def allocate_field(self) -> None:
         """Field and statistics of the active probes, all zero."""
@@ -123,7 +138,7 @@ class GpuBackend:
                 if self._raster is None:
                     self._raster = RasterCapture(self.scene, self.face, hits.layers // 6)
                 self._raster(
-                    self._positions[first_slot : first_slot + part], first_slot, self._probe_slots, hits.texture
+                    self._positions[first_slot : first_slot + part], first_slot, self.probe_slots, hits.texture
                 )
             else:
                 self._trace(first_slot, part, hits)
@@ -138,7 +153,7 @@ class GpuBackend:
     def _trace(self, first_slot: int, count: int, hits) -> None:
         shader = program("capture_trace_comp", FACE=self.face, **self.scene.ray_defines)
         self.scene.bind_rays(shader)
-        shader.uniform_sampler("probe_slots", self._probe_slots)
+        shader.uniform_sampler("probe_slots", self.probe_slots)
         shader.image("hits", hits.texture)
         shader.uniform_int("first_slot", (first_slot,))
         self._dispatch_texels(shader, count)
@@ -146,8 +161,8 @@ class GpuBackend:
     def _resolve(self, first_slot: int, first_layer: int, count: int, hits, surfaces: Surfaces) -> None:
         shader = program("surface_resolve_comp", FACE=self.face, **self.scene.surface_defines)
         self.scene.bind_surfaces(shader)
-        shader.uniform_sampler("probe_slots", self._probe_slots)
-        shader.uniform_sampler("world_texels", self._world_texels)
+        shader.uniform_sampler("probe_slots", self.probe_slots)
+        shader.uniform_sampler("world_texels", self.world_texels)
         shader.uniform_sampler("hits", hits.texture)
         for name in ("geometry", "albedo", "emission"):
             shader.image(name, surfaces.textures[name])
@@ -160,6 +175,7 @@ class GpuBackend:
         shader = program("object_sightings_comp", FACE=self.face)
         result = allocate(surfaces.count * 96, "sightings")
         shader.uniform_sampler("patch_irradiance", self.light.direct)
+        self.scene.bind(shader, "triangle_attributes")
         for name in ("geometry", "albedo", "emission"):
             shader.uniform_sampler(name, surfaces.textures[name])
         shader.image("sightings", result)
@@ -190,6 +206,7 @@ class GpuBackend:
         shader.uniform_sampler("texel_weights", self._texel_weights)
         shader.uniform_sampler("shells", self._shells)
         shader.uniform_sampler("patch_irradiance", self.light.direct)
+        self.scene.bind(shader, "triangle_attributes")
         for name in ("geometry", "albedo", "emission"):
             shader.uniform_sampler(name, surfaces.textures[name])
         shader.image("depth_moments", self._moments)
@@ -211,18 +228,28 @@ class GpuBackend:
     # Light
     # ------------------------------------------------------------------------------------------------------------------
 
+    def forget_patches(self) -> None:
+        """Begins with no patch: all texels must be bound again."""
+        self.light = PatchLight(self.scene, self.grid, self.settings, self.world_texels)
+
     def bind(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> None:
         """Finds the patches on which the texels of all or of ``count`` probes from ``start`` lie."""
         count = surfaces.count if count is None else count
         first = surfaces.first + start
-        patches = self.light.bind_texels(self._texel_hits(surfaces, start, count), self._positions[first : first + count])
-        self._note_patches(surfaces, start, count, patches)
+        patches = self.light.bind_texels(
+            self._texel_hits(surfaces, start, count), self._positions[first : first + count]
+        )
+        shader = program("texel_patches_comp", FACE=self.face)
+        shader.uniform_sampler("patches", patches)
+        shader.image("albedo", surfaces.textures["albedo"])
+        shader.uniform_int("first_layer", (start,))
+        self._dispatch_texels(shader, count)
 
     def _texel_hits(self, surfaces: Surfaces, start: int, count: int) -> gpu.types.GPUTexture:
         """Where texels meet surface, as one linear array."""
         shader = program("texel_hits_comp", FACE=self.face)
         hits = allocate(count * 6 * self.face**2, "texels")
-        shader.uniform_sampler("probe_slots", self._probe_slots)
+        shader.uniform_sampler("probe_slots", self.probe_slots)
         for name in ("geometry", "albedo"):
             shader.uniform_sampler(name, surfaces.textures[name])
         shader.image("hits", hits)
@@ -231,17 +258,11 @@ class GpuBackend:
         self._dispatch_texels(shader, count)
         return hits
 
-    def _note_patches(self, surfaces: Surfaces, start: int, count: int, patches: gpu.types.GPUTexture) -> None:
-        """Stores with each texel where its irradiance stands."""
-        shader = program("texel_patches_comp", FACE=self.face)
-        shader.uniform_sampler("patches", patches)
-        shader.image("albedo", surfaces.textures["albedo"])
-        shader.uniform_int("first_layer", (start,))
-        self._dispatch_texels(shader, count)
-
-    def project(self, surfaces: Surfaces) -> None:
-        """The field of these probes: what their texels send by the light of their patches."""
-        self._project(surfaces, 0, surfaces.count, self.light.irradiance)
+    def project(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> None:
+        """The field of all or of ``count`` probes from ``start``: what their texels send by the light of their
+        patches."""
+        count = surfaces.count if count is None else count
+        self._project(surfaces, start, count, self.light.irradiance, own_texels=False)
 
     def gather(self, surfaces: Surfaces) -> None:
         """The field of these probes by a final gather: every texel with light and paths of its own."""
@@ -251,11 +272,9 @@ class GpuBackend:
             count = min(at_once, surfaces.count - start)
             first_key = (surfaces.first + start) * texels
             irradiance = self.light.gather(self._texel_hits(surfaces, start, count), count * texels, first_key)
-            own = upload(np.arange(count * texels).reshape(-1, 4), "texels")
-            self._note_patches(surfaces, start, count, own)
-            self._project(surfaces, start, count, irradiance)
+            self._project(surfaces, start, count, irradiance, own_texels=True)
 
-    def _project(self, surfaces: Surfaces, start: int, count: int, irradiance: gpu.types.GPUTexture) -> None:
+    def _project(self, surfaces: Surfaces, start: int, count: int, irradiance, own_texels: bool) -> None:
         shader = program(
             "field_project_comp",
             FACE=self.face,
@@ -270,10 +289,11 @@ class GpuBackend:
         shader.image("field", self._field)
         shader.uniform_int("first_slot", (surfaces.first + start,))
         shader.uniform_int("first_layer", (start,))
+        shader.uniform_int("own_texels", (int(own_texels),))
         gpu.compute.dispatch(shader, count, 1, 1)
 
-    def add_emission(self, surfaces: Surfaces) -> None:
-        """Adds what these probes see of sampled emitters to the field."""
+    def add_emission(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> None:
+        """Adds what all or ``count`` probes from ``start`` see of sampled emitters to the field."""
         shader = program(
             "emission_project_comp",
             FACE=self.face,
@@ -285,15 +305,16 @@ class GpuBackend:
         )
         self.scene.bind_surfaces(shader)
         self.scene.bind_emitters(shader)
-        shader.uniform_sampler("probe_slots", self._probe_slots)
+        shader.uniform_sampler("probe_slots", self.probe_slots)
         shader.uniform_sampler("texel_weights", self._texel_weights)
         for name in ("geometry", "emission"):
             shader.uniform_sampler(name, surfaces.textures[name])
         shader.image("field", self._field)
-        self._set_range(shader, surfaces)
+        shader.uniform_int("first_slot", (surfaces.first + start,))
+        shader.uniform_int("first_layer", (start,))
         shader.uniform_int("samples", (_EMITTER_RAYS,))
         shader.uniform_int("seed", (self.settings.seed,))
-        gpu.compute.dispatch(shader, surfaces.count, 1, 1)
+        gpu.compute.dispatch(shader, surfaces.count if count is None else count, 1, 1)
 
     def read_field(self) -> np.ndarray:
         """(slots, coefficients, 3) float32 copy of the field."""
@@ -302,10 +323,6 @@ class GpuBackend:
 
     # Dispatch
     # ---------------------------------------------------------------------------------------------------------------
-
-    def _set_range(self, shader, surfaces: Surfaces) -> None:
-        shader.uniform_int("first_slot", (surfaces.first,))
-        shader.uniform_int("first_layer", (0,))
 
     def _dispatch_texels(self, shader, probes: int) -> None:
         gpu.compute.dispatch(shader, -(-self.face // 8), -(-6 * self.face // 8), probes)

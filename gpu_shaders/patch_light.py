@@ -7,6 +7,7 @@ geometry alone (points, ends of rays, what they reflect) stays where it is when 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import gpu
@@ -41,11 +42,12 @@ class PatchLight:
     """Patches of one bake with their light."""
 
     def __init__(self, scene: SceneTextures, grid: Grid, settings: BakeSettings, world_texels):
-        """``world_texels``: the world's radiance as a linear texture, faces of ``settings.face``²."""
+        """``world_texels``: the world's radiance as a linear texture, faces of ``settings.face``²; may be replaced."""
         self.patches = Patches(grid)
         self._scene, self._settings = scene, settings
-        self._world_texels = world_texels
+        self.world_texels = world_texels
         self._lit = 0  # patches whose direct light is known
+        self._lit_together: list[tuple[int, int]] = []  # ranges of them
         self._effort = 1
         self._direct = np.zeros((0, 4), np.float32)
         self.direct = upload(self._direct, "patches")
@@ -93,26 +95,37 @@ class PatchLight:
             return
         if self._lit == 0:
             self._effort = effort(self.count, self._settings.samples)
+        self._lit_together.append((self._lit, self.count))
+        self._lit = self.count
+        self._light_together(self._lit_together[-1:])
+
+    def light_again(self) -> None:
+        """Direct light of all patches for other lamps or emitters."""
+        self._direct = self._direct[:0]
+        self._light_together(self._lit_together)
+
+    def _light_together(self, ranges: list[tuple[int, int]]) -> None:
+        """Adds direct light of ``ranges`` of patches, each with numbers of samples chosen by its own mean."""
         points = upload(self.patches.points, "patches")
         direct = allocate(self.count, "patches")
-        sample_class = self._sample_class(points)
-        for index, samples in enumerate(SAMPLES):
-            chosen = self._lit + np.flatnonzero(sample_class == index)
-            self._light(points, POINTS, chosen, samples * self._effort, direct)
-        fresh = read(direct, self.count)[self._lit :]
+        for first, stop in ranges:
+            sample_class = self._sample_class(points, first, stop)
+            for index, samples in enumerate(SAMPLES):
+                chosen = first + np.flatnonzero(sample_class == index)
+                self._light(points, POINTS, chosen, samples * self._effort, direct)
+        fresh = read(direct, self.count)[len(self._direct) :]
         self._direct = np.concatenate([self._direct, fresh])
-        self._lit = self.count
         self.direct = upload(self._direct, "patches")
 
-    def _sample_class(self, points: gpu.types.GPUTexture) -> np.ndarray:
-        """Index into SAMPLES of each patch that is not lit yet."""
-        count = self.count - self._lit
+    def _sample_class(self, points: gpu.types.GPUTexture, first: int, stop: int) -> np.ndarray:
+        """Index into SAMPLES of each patch from ``first`` to ``stop``."""
+        count = stop - first
         shader = program("patch_spread_comp", POINTS=POINTS, **self._scene.light_defines)
         spread = allocate(count, "patches")
         self._scene.bind_lights(shader)
         shader.uniform_sampler("patch_points", points)
         shader.image("spread", spread)
-        for name, value in (("first_patch", self._lit), ("patch_count", count), ("seed", self._settings.seed)):
+        for name, value in (("first_patch", first), ("patch_count", count), ("seed", self._settings.seed)):
             shader.uniform_int(name, (value,))
         _dispatch(shader, count)
         mean, deviation = read(spread, count)[:, :2].T
@@ -145,13 +158,10 @@ class PatchLight:
         room for the bounces."""
         ends, brought, reflected = [np.zeros(0)], [np.zeros((0, 4))], [np.zeros((0, 4))]
         self._rays_each = RAYS * self._effort
-        at_once = max(1, _RAYS_AT_ONCE // self._rays_each)
         stop = 0
         for round_ in range(_MOST_ROUNDS):
             start, stop = stop, self.count
-            points = upload(self.patches.points, "patches")
-            for first in range(start, stop, at_once):
-                rays = self._trace(points, POINTS, first, min(stop - first, at_once), self._rays_each)
+            for rays in self._trace_patches(start, stop):
                 ends.append(self._bind_ends(rays.hits, rays.count, round_))
                 brought.append(read(rays.brought, rays.count // self._rays_each))
                 reflected.append(read(rays.reflected, rays.count))
@@ -159,10 +169,36 @@ class PatchLight:
                 break
         self.light_new_patches()
         self._ends = upload(_fours(np.concatenate(ends)), "rays")
-        self._brought = upload(np.concatenate(brought), "patches")
-        self._reflected = upload(np.concatenate(reflected), "rays")
+        self._carry(brought, reflected)
         self._seen = upload(_fours(np.where(self.patches.seen, 1.0, _UNSEEN)), "patches")
         self._irradiance = [allocate(self.count, "patches") for _ in range(3)]
+
+    def carry_again(self) -> bool:
+        """What rays bring along and reflect, for another world or other materials; where they end stays.
+
+        False if a ray that reflected nothing now does, or the other way round: then patches must be found anew.
+        """
+        brought, reflected = [np.zeros((0, 4))], [np.zeros((0, 4))]
+        for rays in self._trace_patches(0, self.count):
+            brought.append(read(rays.brought, rays.count // self._rays_each))
+            reflected.append(read(rays.reflected, rays.count))
+        before, after = (np.concatenate(parts)[:, :3].any(axis=1) for parts in (self._reflecting, reflected))
+        if (before != after).any():
+            return False
+        self._carry(brought, reflected)
+        return True
+
+    def _carry(self, brought: list[np.ndarray], reflected: list[np.ndarray]) -> None:
+        self._reflecting = reflected
+        self._brought = upload(np.concatenate(brought), "patches")
+        self._reflected = upload(np.concatenate(reflected), "rays")
+
+    def _trace_patches(self, start: int, stop: int) -> Iterator[_Rays]:
+        """The rays of patches ``start`` .. ``stop``, part by part."""
+        at_once = max(1, _RAYS_AT_ONCE // self._rays_each)
+        points = upload(self.patches.points, "patches")
+        for first in range(start, stop, at_once):
+            yield self._trace(points, POINTS, first, min(stop - first, at_once), self._rays_each)
 
     def _bind_ends(self, hits: gpu.types.GPUTexture, count: int, round_: int) -> np.ndarray:
         """(count,) patches on which rays of a round end, NOTHING where no light comes back. What only rays see gets the
@@ -196,7 +232,7 @@ class PatchLight:
         if is_path:
             self._scene.bind_lights(shader)
         shader.uniform_sampler("patch_points", points)
-        shader.uniform_sampler("world_texels", self._world_texels)
+        shader.uniform_sampler("world_texels", self.world_texels)
         for name, texture in (("hits", hits), ("carried", carried), ("reflected", reflected)):
             shader.image(name, texture)
         for name, value in (
@@ -248,7 +284,9 @@ class PatchLight:
         gpu.compute.dispatch(shader, 1, 1, 1)
         return tuple(read(self._change, 1)[0].tolist())
 
-    def _bounce(self, direct, brought, reflected, ends, rays_each: int, count: int, target, bounce: bool = True) -> None:
+    def _bounce(
+        self, direct, brought, reflected, ends, rays_each: int, count: int, target, bounce: bool = True
+    ) -> None:
         """Irradiance of ``count`` patches from the newest irradiance at the ends of their rays, into ``target``."""
         shader = program("patch_iterate_comp", RAYS=rays_each)
         for name, texture in (
