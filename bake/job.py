@@ -22,6 +22,7 @@ from ..core.errors import Cancelled, InputError
 from ..core.field import Field
 from ..core.grid import Grid
 from ..core.orientation import ShellVote, inside_solid
+from ..core.probe_edits import ProbeEdits
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..gpu_shaders.backend import GpuBackend, Surfaces
@@ -61,25 +62,39 @@ class BakeResult:
 
 
 def run_bake(
-    snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, reporter: Reporter, should_stop: Callable[[], bool]
+    snapshot: SceneSnapshot,
+    grid: Grid,
+    settings: BakeSettings,
+    reporter: Reporter,
+    should_stop: Callable[[], bool],
+    edits: ProbeEdits | None = None,
 ) -> BakeResult:
-    """Bakes ``snapshot`` into ``grid``. Needs a GPU context.
+    """Bakes ``snapshot`` into ``grid``, as ``bake_steps`` says. Needs a GPU context.
 
     Raises:
         InputError: the scene has no surface, or the grid does not fit the GPU.
         Cancelled: ``should_stop`` returned true between two steps.
     """
     result = BakeResult()
-    for _ in bake_steps(snapshot, grid, settings, reporter, result):
+    for _ in bake_steps(snapshot, grid, settings, reporter, result, edits):
         if should_stop():
             raise Cancelled("cancelled; nothing was written")
     return result
 
 
 def bake_steps(
-    snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, reporter: Reporter, result: BakeResult
+    snapshot: SceneSnapshot,
+    grid: Grid,
+    settings: BakeSettings,
+    reporter: Reporter,
+    result: BakeResult,
+    edits: ProbeEdits | None = None,
 ) -> Iterator[None]:
-    """The bake in steps; fills ``result`` as it goes and completes it with the last step."""
+    """The bake in steps; fills ``result`` as it goes and completes it with the last step.
+
+    ``edits``: probes that the user switched off or moved. Moved ones capture where they were put and are not relocated.
+    """
+    edits = edits or ProbeEdits.none(grid)
     if not len(snapshot.triangles):
         raise InputError(f"scene '{snapshot.name}' has no surface that renders; add or unhide a mesh")
     _warn_about_light(snapshot, result)
@@ -87,6 +102,11 @@ def bake_steps(
     with _timed(result, "cull"):
         reporter.phase("cull")
         state = _cull(snapshot, grid, settings, result)
+        state[edits.disabled] = CULLED
+        if edits.disabled.any() and not (state == ACTIVE).any():
+            raise InputError(
+                f"{grid.name}: every probe is switched off; bring some back with Reset"
+            )
     yield
 
     with _timed(result, "setup"):
@@ -94,7 +114,7 @@ def bake_steps(
         backend = GpuBackend(snapshot, grid, settings)
         result.scene = backend.scene
         nodes = np.flatnonzero(state == ACTIVE)
-        positions = grid.positions()[nodes]
+        positions = (grid.positions() + edits.offset)[nodes]
     yield
     with _timed(result, "capture"):
         result.capture, reason = choose_capture(settings, backend.scene.triangle_count)
@@ -123,7 +143,7 @@ def bake_steps(
     backend.set_shells(vote.shells())
     yield from _each_statistics(batches, backend)
     shares = backend.read_shares()
-    offset = np.zeros((grid.count, 3), np.float32)
+    offset = edits.offset.astype(np.float32)
     moved = yield from _relocate(batches, backend, grid, nodes, shares, offset)
     if moved:
         result.notes.append(f"{moved} probes in or behind walls were moved out, at most half a cell")
@@ -152,6 +172,11 @@ def bake_steps(
             if factor:
                 backend.light.extrapolate(factor)
         yield
+    if backend.scene.emitter_count:
+        for index in range(batches.count):
+            with _timed(result, "light"):
+                backend.find_emission(batches.captured(index))
+            yield
     reporter.phase("gather" if settings.gather else "project", len(nodes))
     for index in range(batches.count):
         surfaces = batches.captured(index)
@@ -159,12 +184,6 @@ def bake_steps(
             (backend.gather if settings.gather else backend.project)(surfaces)
             reporter.advance(surfaces.count)
         yield
-
-    if backend.scene.emitter_count:
-        for index in range(batches.count):
-            with _timed(result, "light"):
-                backend.add_emission(batches.captured(index))
-            yield
 
     with _timed(result, "light"):
         result.iterations = convergence.iterations
@@ -245,10 +264,11 @@ def _relocate(
 
     A probe that sees no light from its new place either goes back.
     """
-    candidates = np.flatnonzero(relocation.misplaced(shares))
+    moved_by_hand = offset[nodes].any(axis=1)
+    candidates = np.flatnonzero(relocation.misplaced(shares) & ~moved_by_hand)
     if not len(candidates):
         return 0
-    home = grid.positions()[nodes]
+    home = grid.positions()[nodes] + offset[nodes]
     step = np.zeros((len(nodes), 3))
     for index in range(batches.count):
         surfaces = batches.captured(index)
@@ -274,7 +294,7 @@ def _relocate(
             if len(batches.slots_of(index, changed)):
                 backend.statistics(batches.captured(index))
             yield
-    offset[nodes] = step
+    offset[nodes] += step
     return int(step.any(axis=1).sum())
 
 

@@ -15,21 +15,20 @@ import numpy as np
 from ..core import lookup
 from ..core.conventions import DEPTH_EDGE
 from ..core.cubemap import texel_solid_angles
-from ..core.emitters import sampling_density
+from ..core.emitters import PROBE_POINTS, PROBE_RAYS, sampling_density
 from ..core.grid import Grid
+from ..core.patches import gather_rays
 from ..core.scene_changes import SceneChanges
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..core.world_map import world_texels
-from .patch_light import PatchLight, gather_rays
+from .patch_light import PatchLight
 from .programs import program
 from .raster_capture import RasterCapture
 from .scene_textures import SceneTextures
 from .textures import allocate, layers, read, upload
 
 _GROUP = 64  # threads that share a probe where its texels are summed
-_EMITTER_POINTS = 4096  # that each probe considers besides its texels
-_EMITTER_RAYS = 512  # that it sends to them
 # Kept images of texel surfaces. Albedo is 32 bit: in a bright room an error of 1e-4 in 0.99 is one of 1e-2 in the
 # light.
 _SURFACE_FORMATS = {
@@ -114,7 +113,8 @@ class GpuBackend:
 
     def allocate_field(self) -> None:
         """Field and statistics of the active probes, all zero."""
-        self._field = allocate(len(self._nodes) * self.coefficients, "field coefficients")
+        elements = len(self._nodes) * self.coefficients
+        self._field, self._emitted = (allocate(elements, "field coefficients") for _ in range(2))
         self._moments = allocate(len(self._nodes) * DEPTH_EDGE**2, "depth statistics", "RG32F")
         self._shares = allocate(len(self._nodes), "probes")
 
@@ -284,6 +284,7 @@ class GpuBackend:
         )
         shader.uniform_sampler("texel_weights", self._texel_weights)
         shader.uniform_sampler("patch_irradiance", irradiance)
+        shader.uniform_sampler("emitted", self._emitted)
         for name in ("albedo", "emission"):
             shader.uniform_sampler(name, surfaces.textures[name])
         shader.image("field", self._field)
@@ -292,15 +293,15 @@ class GpuBackend:
         shader.uniform_int("own_texels", (int(own_texels),))
         gpu.compute.dispatch(shader, count, 1, 1)
 
-    def add_emission(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> None:
-        """Adds what all or ``count`` probes from ``start`` see of sampled emitters to the field."""
+    def find_emission(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> None:
+        """What all or ``count`` probes from ``start`` see of sampled emitters, for ``project`` and ``gather`` to add."""
         shader = program(
             "emission_project_comp",
             FACE=self.face,
             BANDS=self.settings.bands,
             COEFFICIENTS=self.coefficients,
             GROUP=_GROUP,
-            CANDIDATE_COUNT=_EMITTER_POINTS,
+            CANDIDATE_COUNT=PROBE_POINTS,
             **self.scene.light_defines,
         )
         self.scene.bind_surfaces(shader)
@@ -309,10 +310,10 @@ class GpuBackend:
         shader.uniform_sampler("texel_weights", self._texel_weights)
         for name in ("geometry", "emission"):
             shader.uniform_sampler(name, surfaces.textures[name])
-        shader.image("field", self._field)
+        shader.image("emitted", self._emitted)
         shader.uniform_int("first_slot", (surfaces.first + start,))
         shader.uniform_int("first_layer", (start,))
-        shader.uniform_int("samples", (_EMITTER_RAYS,))
+        shader.uniform_int("samples", (PROBE_RAYS,))
         shader.uniform_int("seed", (self.settings.seed,))
         gpu.compute.dispatch(shader, surfaces.count if count is None else count, 1, 1)
 

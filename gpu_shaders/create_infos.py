@@ -143,7 +143,7 @@ def _light_files(defines: dict) -> list[str]:
 
 
 def field_project_comp(info, defines):
-    slot = _samplers(info, "texel_weights", "patch_irradiance")
+    slot = _samplers(info, "texel_weights", "patch_irradiance", "emitted")
     _samplers(info, "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "field")
     _ints(info, "first_slot", "first_layer", "own_texels")
@@ -264,7 +264,7 @@ def emission_project_comp(info, defines):
     slot = _emitters(info, defines, slot)
     slot = _samplers(info, "lights", "probe_slots", "texel_weights", first=slot)
     _samplers(info, "geometry", "emission", kind="FLOAT_2D_ARRAY", first=slot)
-    _image(info, 0, "field", access="READ+WRITE")
+    _image(info, 0, "emitted")
     _ints(info, "first_slot", "first_layer", "light_count", "samples", "seed")
     info.local_group_size(int(defines["GROUP"]), 1, 1)
     return {

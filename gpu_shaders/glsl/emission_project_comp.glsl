@@ -1,4 +1,4 @@
-/* What probes see of sampled emitters, added to the field once the bounces have settled.
+/* What probes see of sampled emitters: the part of the field that no bounce and no lamp changes; field_project_comp adds it.
  *
  * Two ways, each where it is denser: texels, which carry emitters that fill many of them, and points on the emitters, which carry
  * those that fall between texel centres. Every place on an emitter belongs to one of the two. Texel centres are not random, so
@@ -113,6 +113,6 @@ void main()
       total += partial_sums[c * GROUP + i].rgb;
     }
     ivec2 target = element_position((first_slot + probe) * COEFFICIENTS + c);
-    imageStore(field, target, imageLoad(field, target) + vec4(total, 0.0));
+    imageStore(emitted, target, vec4(total, 0.0));
   }
 }

@@ -1,4 +1,5 @@
-/* Outgoing radiance of every texel (emission that is not sampled + albedo/π · irradiance of its patch) and its projection to SH.
+/* Outgoing radiance of every texel (emission that is not sampled + albedo/π · irradiance of its patch), projected to SH, and
+ * `emitted`, what emission_project_comp found of sampled emitters.
  *
  * With own_texels the irradiance of texel i of the dispatch's probe p is element p · 6 · FACE² + i.
  * Dispatch: one group of GROUP threads a probe. Threads take texels in strides, then each coefficient is summed over the threads in
@@ -37,6 +38,7 @@ void main()
     for (int i = 0; i < GROUP; i++) {
       total += partial_sums[c * GROUP + i].rgb;
     }
-    imageStore(field, element_position((first_slot + probe) * COEFFICIENTS + c), vec4(total, 0.0));
+    int index = (first_slot + probe) * COEFFICIENTS + c;
+    imageStore(field, element_position(index), vec4(total + element(emitted, index).rgb, 0.0));
   }
 }
