@@ -8,6 +8,7 @@ what is hidden.
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 
 import gpu
@@ -29,6 +30,8 @@ MOST_VOLUMES = 16  # 64 vec4 of boxes
 ENCODINGS = ("SCENE_LINEAR", "OVERLAY", "DISPLAY")
 TONE_CURVES = ("STANDARD", "FILMIC", "LINEAR")
 FULL_SCREEN = np.array([[-1, -1], [3, -1], [-1, 3]], np.float32)
+# Images are rendered in a thread of their own while the viewport draws on, and both set the inputs of one shader.
+_one_at_a_time = threading.Lock()
 _SQUARE = np.array([[-1, -1], [1, -1], [1, 1], [-1, -1], [1, 1], [-1, 1]], np.float32)
 # Roberts' R2 sequence, which covers a pixel evenly however many samples are taken; the first is its centre.
 _JITTER = np.array([0.7548776662466927, 0.5698402909980532])
@@ -133,10 +136,12 @@ class ViewportPass:
         Where nothing is hit there is the world in views of light, unless ``backdrop`` is False. Sets GPU state without
         restoring it.
         """
+        with _one_at_a_time:
+            self._draw(picture, view, shading, probes, visible or self._all_visible, backdrop)
+
+    def _draw(self, picture, view, shading, probes, visible, backdrop) -> None:
         local = view.relative_to(self._origin)
-        self._sample = _Sample(
-            view_block(local, picture.height, picture.jitter()), shading, picture.samples, visible or self._all_visible
-        )
+        self._sample = _Sample(view_block(local, picture.height, picture.jitter()), shading, picture.samples, visible)
         spheres = [self._spheres(field, local.camera.position, probes) for field in self._fields] if probes else []
         framebuffer = picture.begin()
         with framebuffer.bind():

@@ -85,7 +85,7 @@ class GRIDLIGHT_RE_engine(bpy.types.RenderEngine):
         else:
             self.report({"WARNING"}, f"scene '{scene.name}' has no surface that renders")
         left, bottom, right, top = border(scene.render, width, height)
-        part = np.ascontiguousarray(pixels[bottom:top, left:right]).reshape(-1, 4)
+        part = np.ascontiguousarray(pixels[bottom:top, left:right]).reshape(-1)
         result = self.begin_result(0, 0, right - left, top - bottom)
         result.layers[0].passes["Combined"].rect.foreach_set(part)
         self.end_result(result)

@@ -75,6 +75,44 @@ def test_the_render_engine_shows_what_the_preview_shows(person):
 
 
 @in_blender()
+def test_f12_renders_while_the_preview_goes_on(person):
+    """The image is made in a thread of its own, with the viewport drawing beside it."""
+    lit_room.build(person)
+    scene = bpy.context.scene
+    scene.render.engine = "GRIDLIGHT"
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 160, 90, 100
+    scene.camera.location = (0, 0, 0)
+    scene.view_settings.view_transform = "Standard"
+    bpy.context.preferences.view.render_display_type = "NONE"
+    switch(person, enabled=True, mode="INDIRECT")
+    yield from lit_room.drawn(person)
+    seen = []
+    bpy.app.handlers.render_complete.append(lambda *_: seen.append(True))
+    try:
+        with person.at_viewport():
+            bpy.ops.render.render("INVOKE_DEFAULT")
+        for _ in range(600):
+            if seen:
+                break
+            person.area().spaces.active.region_3d.view_distance *= 1.01
+            yield 0.05
+    finally:
+        bpy.app.handlers.render_complete.pop()
+    path = os.path.join(bpy.app.tempdir, "render.png")
+    bpy.data.images["Render Result"].save_render(path)
+    image = bpy.data.images.load(path)
+    pixels = np.array(image.pixels[:]).reshape(90, 160, 4)[..., :3] * 255
+    bpy.data.images.remove(image)
+    os.remove(path)
+    expected = lit_room.display(np.array(lit_room.ALBEDO) * lit_room.RADIANCE)
+    assert np.abs(pixels - expected).max() <= 1.5, np.abs(pixels - expected).max()
+    yield from lit_room.drawn(person)
+    assert np.abs(lit_room.middle(person, share=0.3) - expected).max() <= 2.0
+    switch(person, enabled=False)
+    bpy.context.preferences.view.render_display_type = "WINDOW"
+
+
+@in_blender()
 def test_data_modes_and_probes(person):
     volume = lit_room.build(person)
     preview = switch(person, enabled=True, mode="NORMALS")
