@@ -29,6 +29,7 @@ from ..gpu_shaders.backend import GpuBackend, Surfaces
 from ..gpu_shaders.scene_textures import SceneTextures
 from .capture_choice import choose_capture
 from .convergence import Convergence
+from .deringing import dering_field
 
 
 class Reporter(Protocol):
@@ -191,6 +192,8 @@ def bake_steps(
         result.change = convergence.changes
         result.notes.append(convergence.reason)
         result.field = _finish(backend, grid, settings, state, nodes, shares, offset)
+        if settings.deringing:
+            result.notes.append(dering_field(result.field))
     result.counts = {
         "total": grid.count,
         "active": int((state == ACTIVE).sum()),

@@ -137,6 +137,7 @@ def run(args, reporter, should_stop):
     import bpy
 
     from ..scene.open_file import open_blend, set_frame
+    from ..scene.probe_objects import edits_of
     from ..scene.read import read_scene
     from . import pipeline
 
@@ -155,7 +156,8 @@ def run(args, reporter, should_stop):
         if should_stop():
             raise Cancelled("cancelled")
         pipeline.start_gpu(reporter, stopwatch)
-        results = pipeline.bake_volumes(snapshot, grids, settings, reporter, should_stop, stopwatch)
+        edits = [edits_of(scene, grid) for grid in grids]
+        results = pipeline.bake_volumes(snapshot, grids, settings, reporter, should_stop, stopwatch, edits)
         title = Path(args.file or bpy.data.filepath or scene.name).name
         return pipeline.write_results(title, snapshot, settings, results, folder, reporter, should_stop, stopwatch)
 

@@ -13,9 +13,9 @@ from ..bake.job import BakeResult, run_bake
 from ..bake.preview import write_previews
 from ..core.conventions import ACTIVE, CULLED, INVALID
 from ..core.errors import InputError
-from ..core.field import Field
 from ..core.grid import Grid
-from ..core.ringing import dering, ringing
+from ..core.probe_edits import ProbeEdits
+from ..core.ringing import ringing
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..formats import probe_file, probe_metadata
@@ -70,19 +70,23 @@ def check_snapshot(snapshot: SceneSnapshot, reporter) -> None:
 
 
 def bake_volumes(
-    snapshot: SceneSnapshot, grids: list[Grid], settings: BakeSettings, reporter, should_stop, stopwatch: Stopwatch
+    snapshot: SceneSnapshot,
+    grids: list[Grid],
+    settings: BakeSettings,
+    reporter,
+    should_stop,
+    stopwatch: Stopwatch,
+    edits: list[ProbeEdits | None] | None = None,
 ) -> list[BakeResult]:
-    """Bakes ``grids`` one after the other."""
+    """Bakes ``grids`` one after the other, each with its ``edits``."""
     for grid in grids:
         probe_file.check_size(grid, settings.bands)
     results = []
-    for grid in grids:
+    for grid, edit in zip(grids, edits or [None] * len(grids)):
         if len(grids) > 1:
             reporter.note(f"volume '{grid.name}'")
-        result = run_bake(snapshot, grid, settings, reporter, should_stop)
+        result = run_bake(snapshot, grid, settings, reporter, should_stop, edit)
         stopwatch.add(result.seconds)
-        if settings.deringing:
-            result.notes.append(_dering(result.field))
         for warning in result.warnings:
             reporter.warn(warning)
         for note in result.notes:
@@ -94,17 +98,6 @@ def bake_volumes(
             )
         results.append(result)
     return results
-
-
-def _dering(field: Field) -> str:
-    """Windows ``field`` where it rings; returns what to say about it."""
-    window = dering(field.coefficients)
-    field.coefficients = window.coefficients
-    done = window.as_dict()
-    return (
-        f"deringing: {done['windowed']} of {done['probes']} probes flattened, the strongest to "
-        f"{done['least_factor']:.2f} of its contrast; irradiance changed by {100 * window.damage:.2g} % of its RMS"
-    )
 
 
 def write_results(

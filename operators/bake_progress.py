@@ -8,13 +8,14 @@ import time
 from ..core.settings import BakeSettings
 
 # Phases in order, with the share of a volume's bake that each takes about.
-_SHARES = {"read": 0.05, "cull": 0.05, "upload": 0.1, "capture": 0.3, "light": 0.3, "gather": 0.2}
+_SHARES = {"read": 0.05, "cull": 0.05, "upload": 0.1, "capture": 0.3, "light": 0.3, "project": 0.1, "gather": 0.4}
 _TITLES = {
     "read": "Reading the scene",
     "cull": "Culling probes",
     "upload": "Sending the scene to the GPU",
     "capture": "Capturing",
     "light": "Bouncing light",
+    "project": "Collecting light",
     "gather": "Gathering",
 }
 _TYPICAL_ITERATIONS = 8  # until light has settled; only the bar's speed hangs on it
@@ -30,7 +31,8 @@ class Progress:
         self.name = ""
         self._volumes = volumes
         self._volume = 0
-        self._gathers = settings.gather > 0
+        self._unused = "project" if settings.gather else "gather"
+        self._reached = 0.0
         self._iterations = None if settings.bounces is None else settings.bounces + 1
         self._phase = "read"
         self._done, self._total = 0, None
@@ -57,8 +59,8 @@ class Progress:
 
     @property
     def share(self) -> float:
-        """0 … 1 of the whole work, as far as it can be known."""
-        shares = {name: share for name, share in _SHARES.items() if self._gathers or name != "gather"}
+        """0 … 1 of the whole work, as far as it can be known. Never goes back."""
+        shares = {name: share for name, share in _SHARES.items() if name != self._unused}
         names = list(shares)
         before = sum(shares[name] for name in names[: names.index(self._phase)]) if self._phase in shares else 0.0
         if self._total:
@@ -66,7 +68,8 @@ class Progress:
         else:  # how many there will be is not known: the bar slows down
             within = 1.0 - 0.5 ** (2.0 * self._done / _TYPICAL_ITERATIONS)
         in_volume = (before + shares.get(self._phase, 0.0) * within) / sum(shares.values())
-        return (max(self._volume - 1, 0) + in_volume) / self._volumes
+        self._reached = max(self._reached, (max(self._volume - 1, 0) + in_volume) / self._volumes)
+        return self._reached
 
     @property
     def seconds_left(self) -> float | None:

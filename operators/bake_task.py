@@ -93,9 +93,7 @@ class BakeTask:
         for grid, edit in zip(grids, edits):
             self.progress.volume(grid.name)
             result = BakeResult()
-            yield from bake_steps(
-                snapshot, grid, self.settings, self.progress, result, **({"edits": edit} if edit else {})
-            )
+            yield from bake_steps(snapshot, grid, self.settings, self.progress, result, edit)
             results.append(result)
         self.outcome = _in_words(results, time.perf_counter() - started)
         for volume, result in zip(self._find_volumes(), results):

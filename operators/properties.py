@@ -152,7 +152,7 @@ class GridlightExport(bpy.types.PropertyGroup):
     target: EnumProperty(name="Format", description="What the files are for", items=TARGET_ITEMS, options=set())
     directory: StringProperty(
         name="Folder",
-        description="Where the files go; empty is a folder \"gridlight\" beside this .blend",
+        description='Where the files go; empty is a folder "gridlight" beside this .blend',
         subtype="DIR_PATH",
         options=set(),
     )
@@ -264,6 +264,12 @@ class GridlightSettings(bpy.types.PropertyGroup):
         default=_STANDARD.keep_all,
         options=set(),
     )
+    deringing: BoolProperty(
+        name="Deringing",
+        description="Dampen probes whose light would fall below zero in some directions, as little as that takes",
+        default=_STANDARD.deringing,
+        options=set(),
+    )
     memory_mib: IntProperty(
         name="Memory",
         description="Limit for what probes keep on the GPU during a bake, in MiB. Where it is too small, probes are "
@@ -294,6 +300,7 @@ class GridlightSettings(bpy.types.PropertyGroup):
             seed=self.seed,
             keep_all=self.keep_all,
             memory_mib=self.memory_mib,
+            deringing=self.deringing,
         )
 
 

@@ -70,6 +70,7 @@ class GRIDLIGHT_PT_bake_settings(SidebarPanel, bpy.types.Panel):
         column.prop(settings, "seed")
         column.prop(settings, "memory_mib")
         column.prop(settings, "keep_all")
+        column.prop(settings, "deringing")
 
 
 def _running(layout, task) -> None:

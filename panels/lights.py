@@ -10,7 +10,7 @@ from ..scene.lights import GROUP_PROPERTY, is_dynamic
 from .sidebar_panel import SidebarPanel, paragraph
 
 _ICONS = {"POINT": "LIGHT_POINT", "SUN": "LIGHT_SUN", "SPOT": "LIGHT_SPOT", "AREA": "LIGHT_AREA"}
-_NARROW = 260  # pixels; below, only what fits is drawn
+_WIDE = 400  # pixels; below, the group is only shown for the light that is chosen
 
 
 class GRIDLIGHT_UL_lights(bpy.types.UIList):
@@ -19,10 +19,11 @@ class GRIDLIGHT_UL_lights(bpy.types.UIList):
     def draw_item(self, context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag):
         light = item.gridlight_light
         glows = item.type != "LIGHT"
-        split = layout.split(factor=0.55)
+        wide = context.region.width > _WIDE
+        split = layout.split(factor=0.5 if wide else 0.75)
         split.label(text=item.name, icon="LIGHT_HEMI" if glows else _ICONS[item.data.type])
         row = split.row(align=True)
-        if context.region.width > _NARROW:
+        if wide:
             row.prop(light, "group", text="", emboss=False)
         row.prop(light, "intensity", text="", emboss=False)
 

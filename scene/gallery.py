@@ -156,7 +156,7 @@ class _Builder:
         lamp = bpy.data.lights.new("Wandering lamp", "POINT")
         lamp.energy, lamp.color, lamp.shadow_soft_size = 60.0, (1.0, 0.72, 0.42), 0.09
         thing = bpy.data.objects.new("Wandering lamp", lamp)
-        thing["gridlight_group"] = "dynamic"
+        thing["gridlight_group"], thing["gridlight_role"] = "dynamic", "dynamic"
         for frame, place in LAMP_PATH.items():
             thing.location = place
             thing.keyframe_insert("location", frame=frame)

@@ -16,7 +16,7 @@ from mathutils import Matrix, Vector
 from ..core.conventions import ACTIVE, CULLED
 from ..core.grid import Grid
 from ..core.probe_edits import ProbeEdits, bounded
-from .volumes import box_of, resolution_of
+from .volumes import box_of, is_volume, resolution_of
 
 COLLECTION = "Gridlight Probes"
 OBJECT_LIMIT = 2000  # more objects than this make Blender's own interface slow
@@ -98,6 +98,14 @@ def read_edits(scene: bpy.types.Scene, volume_object: bpy.types.Object) -> Probe
     offset[np.abs(offset).max(axis=1) < _MOVED * grid.cell_size().min()] = 0.0
     edits = ProbeEdits(placed & ~found, bounded(grid, offset))
     return edits if edits.any else None
+
+
+def edits_of(scene: bpy.types.Scene, grid: Grid) -> ProbeEdits | None:
+    """What ``read_edits`` says about the volume that ``grid`` stands for; None where it stands for none as it is."""
+    volume_object = scene.objects.get(grid.name)
+    if not is_volume(volume_object) or resolution_of(volume_object) != tuple(grid.resolution):
+        return None
+    return read_edits(scene, volume_object)
 
 
 def reset(scene: bpy.types.Scene, volume_object: bpy.types.Object, only: set[bpy.types.Object] | None = None) -> int:

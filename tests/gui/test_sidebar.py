@@ -46,7 +46,7 @@ def test_lights_are_listed_with_role_group_and_intensity(person):
     yield 0.3
     person.picture("lights")
     sidebar = person.rectangle(person.region("UI"))
-    for text in ("Hall ceiling light", "Role", "Group", "Intensity"):
+    for text in ("Hall ceiling", "Wandering lamp", "Role", "Group", "Intensity"):
         assert person.find(text, sidebar), text
 
 
