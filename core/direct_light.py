@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .sampling import sample_disk, tangent_frame
 from .snapshot import Light
 
 Visible = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
@@ -88,7 +89,7 @@ def _sample_area(light: Light, points: np.ndarray, u: np.ndarray) -> LightSample
     matrix = np.asarray(light.matrix, float)
     right, up, back, centre = matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3]
     is_ellipse = light.shape == "ELLIPSE"
-    place = 0.5 * _on_disk(u) if is_ellipse else u - 0.5
+    place = 0.5 * sample_disk(u) if is_ellipse else u - 0.5
     to_light = centre - points + place[:, :1] * light.size_x * right + place[:, 1:] * light.size_y * up
     distances = np.linalg.norm(to_light, axis=1)
     directions = to_light / np.maximum(distances, 1e-20)[:, None]
@@ -118,7 +119,7 @@ def _sample_point(light: Light, points: np.ndarray, u: np.ndarray) -> LightSampl
         return LightSamples(axis, centre_distance, colour / squared[:, None])
 
     tangent, bitangent = tangent_frame(axis)
-    disk = radius * _on_disk(u)
+    disk = radius * sample_disk(u)
     to_disk = to_centre + disk[:, :1] * tangent + disk[:, 1:] * bitangent
     disk_distance = np.linalg.norm(to_disk, axis=1)
     # radiance × area × cos at the disk / distance², and cos at the disk is centre_distance / distance
@@ -153,22 +154,6 @@ def spot_mask(light: Light, directions: np.ndarray) -> np.ndarray:
     local /= np.linalg.norm(local, axis=1, keepdims=True)
     x = np.clip((local[:, 2] - cosine) / width, 0, 1)
     return x * x * (3 - 2 * x)
-
-
-def tangent_frame(n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors perpendicular to each of ``n`` (N, 3): Duff et al., "Building an Orthonormal Basis, Revisited",
-    JCGT 2017."""
-    x, y, z = n.T
-    s = np.where(z >= 0, 1.0, -1.0)
-    a = -1.0 / (s + z)
-    c = x * y * a
-    return np.stack([1 + s * x * x * a, s * c, -s * x], 1), np.stack([c, s + y * y * a, -y], 1)
-
-
-def _on_disk(u: np.ndarray) -> np.ndarray:
-    """(N, 2) points spread evenly over the unit disk."""
-    radius, angle = np.sqrt(u[:, 0]), 2 * np.pi * u[:, 1]
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
 
 
 def _in_cone(axis: np.ndarray, one_minus_cos: np.ndarray | float, u: np.ndarray) -> np.ndarray:

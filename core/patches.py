@@ -40,6 +40,8 @@ _VARIANTS = 3  # patches of one cell that do not see each other; hits beyond joi
 _FINEST = -10  # level: cells of 2⁻¹⁰ of the plain size
 _SHIFT = 0.37  # of a cell: walls tend to lie at round numbers
 _AXIS_BITS = 18
+MOST_ROUNDS = 12  # of rays that find surface which nothing has seen before
+_COARSEST = 3  # levels by which patches grow that only rays see
 
 
 def effort(count: int, samples: int) -> int:
@@ -47,6 +49,11 @@ def effort(count: int, samples: int) -> int:
     probes see is the mean over patches, so few patches need more of each."""
     few = 2 ** int(np.clip(np.ceil(np.log2(_MANY / max(count, 1))), 0, 3))
     return min(few * samples, _MOST_EFFORT)
+
+
+def gather_rays(samples: int) -> int:
+    """Rays of one texel in the final gather; a multiple of 4."""
+    return 4 * -(-samples // 4)
 
 
 def direct_samples(mean: np.ndarray, deviation: np.ndarray) -> np.ndarray:
@@ -114,6 +121,20 @@ class Patches:
         if found:
             self._choose_points(first_new, hits, result)
         return result
+
+    def bind_ends(
+        self, hits: np.ndarray, round_: int, sees: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    ) -> np.ndarray:
+        """(H,) patches on which rays of a round end, NOTHING for ``hits`` (H, 4) without surface, where no light comes
+        back. What only rays see gets the coarser patches the more rays it takes to see it, in the last round none."""
+        ends = self.bind(hits, None, sees, found=round_ == 0)
+        lost = (ends == NO_PATCH) & (hits[:, 3] >= 0)
+        ends[hits[:, 3] < 0] = NOTHING
+        if lost.any() and 0 < round_ < MOST_ROUNDS - 1:
+            alone = hits.copy()
+            alone[~lost, 3] = -1.0
+            ends[lost] = self.bind(alone, None, sees, coarser=min(round_, _COARSEST))[lost]
+        return ends
 
     def _cell_keys(self, hits: np.ndarray, view_distance: np.ndarray | None, coarser: int) -> np.ndarray:
         """(H,) uint64: size, place and facing of the cell that each of ``hits`` lies in."""

@@ -14,7 +14,7 @@ import gpu
 import numpy as np
 
 from ..core.grid import Grid
-from ..core.patches import NO_PATCH, NOTHING, POINTS, RAYS, SAMPLES, Patches, direct_samples, effort
+from ..core.patches import MOST_ROUNDS, POINTS, RAYS, SAMPLES, Patches, direct_samples, effort, gather_rays
 from ..core.settings import BakeSettings
 from .programs import program
 from .scene_textures import SceneTextures
@@ -23,9 +23,7 @@ from .textures import allocate, read, upload
 _GROUP = 64
 _GROUPS_IN_ROW = 2**21 // _GROUP  # as LINEAR_THREAD counts
 _RAYS_AT_ONCE = 1 << 20
-_COARSEST = 3  # levels by which patches grow that only rays see
 _UNSEEN = 1e-6  # weight of patches that no probe sees where iterations are compared: light may still be on its way
-_MOST_ROUNDS = 12  # of rays that find surface which nothing has seen before
 
 
 @dataclass
@@ -159,7 +157,7 @@ class PatchLight:
         ends, brought, reflected = [np.zeros(0)], [np.zeros((0, 4))], [np.zeros((0, 4))]
         self._rays_each = RAYS * self._effort
         stop = 0
-        for round_ in range(_MOST_ROUNDS):
+        for round_ in range(MOST_ROUNDS):
             start, stop = stop, self.count
             for rays in self._trace_patches(start, stop):
                 ends.append(self._bind_ends(rays.hits, rays.count, round_))
@@ -201,18 +199,7 @@ class PatchLight:
             yield self._trace(points, POINTS, first, min(stop - first, at_once), self._rays_each)
 
     def _bind_ends(self, hits: gpu.types.GPUTexture, count: int, round_: int) -> np.ndarray:
-        """(count,) patches on which rays of a round end, NOTHING where no light comes back. What only rays see gets the
-        coarser patches the more rays it takes to see it, in the last round none."""
-        values = read(hits, count)
-        ends = self.patches.bind(values, None, self._sees(hits), found=round_ == 0)
-        lost = (ends == NO_PATCH) & (values[:, 3] >= 0)
-        if lost.any() and 0 < round_ < _MOST_ROUNDS - 1:
-            values[~lost, 3] = -1.0
-            founded = self.patches.bind(values, None, self._sees(hits), coarser=min(round_, _COARSEST))
-            ends[lost] = founded[lost]
-            lost = np.zeros(count, bool)
-        ends[(ends == NO_PATCH) & ~lost] = NOTHING
-        return ends
+        return self.patches.bind_ends(read(hits, count), round_, self._sees(hits))
 
     def _trace(self, points, points_each: int, first: int, count: int, rays_each: int, segments: int = 1, first_key=0):
         """``rays_each`` rays of each of ``count`` patches from ``first``, with ``points_each`` places in ``points``."""
@@ -323,14 +310,9 @@ class PatchLight:
         reflects = np.flatnonzero(read(hits, count)[:, 3] >= 0)
         self._light(hits, 1, reflects, settings.samples, direct, first_key)
         rays = self._trace(hits, 1, 0, count, rays_each, settings.gather, first_key)
-        ends = upload(_fours(self._bind_ends(rays.hits, rays.count, _MOST_ROUNDS - 1)), "rays")
+        ends = upload(_fours(self._bind_ends(rays.hits, rays.count, MOST_ROUNDS - 1)), "rays")
         self._bounce(direct, rays.brought, rays.reflected, ends, rays_each, count, result)
         return result
-
-
-def gather_rays(samples: int) -> int:
-    """Rays of one texel in the final gather."""
-    return 4 * -(-samples // 4)
 
 
 def _dispatch(shader, threads: int) -> None:

@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light of small emissive surfaces, readable and slow: the twin of emitter_lib.glsl and emission_project_comp.glsl.
+
+Which triangles are sampled and why: core/emitters.py. Positions relative to the volume's centre; N points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import spherical_harmonics as sh
+from .cubemap import direction_to_texel, texel_solid_angles
+from .reference_scene import ReferenceScene, Surfaces
+from .sampling import keys_of, sample_cosine, sample_r2, sample_r3, shifted
+
+CANDIDATES = 8  # points on emitters of which one is traced
+_SHADOW_END = 0.9999  # of the distance to the emitter
+_CHOICE_STREAM, _DIRECTION_STREAM, _PROBE_STREAM = 0x68E31DA4, 0x3C6EF372, 0xB5297A4D
+
+
+@dataclass
+class EmitterSamples:
+    """Points on emitters, one for each number."""
+
+    point: np.ndarray  # (N, 3)
+    normal: np.ndarray  # (N, 3) unit
+    radiance: np.ndarray  # (N, 3)
+    density: np.ndarray  # (N,) per m²
+
+
+@dataclass
+class _Arrival:
+    """Light from points on emitters at surfaces, if nothing stands between."""
+
+    irradiance: np.ndarray  # (N, 3)
+    direction: np.ndarray  # (N, 3)
+    distance: np.ndarray  # (N,)
+
+
+class ReferenceEmitters:
+    """Emitters of ``scene`` by ``density`` (T,), see core.emitters.sampling_density."""
+
+    def __init__(self, scene: ReferenceScene, density: np.ndarray):
+        self.scene, self.density = scene, density
+        self._triangle = np.flatnonzero(density > 0)
+        edge = scene.triangles[self._triangle, 1:] - scene.triangles[self._triangle, :1]
+        across = np.cross(edge[:, 0], edge[:, 1])
+        twice_area = np.linalg.norm(across, axis=1)
+        self._end = np.cumsum(density[self._triangle] * twice_area / 2)
+        self._edge, self._normal = edge, across / twice_area[:, None]
+        self.reach = (np.pi * density[self._triangle].min()) ** -0.5 if self.count else 0.0
+
+    @property
+    def count(self) -> int:
+        return len(self._triangle)
+
+    def sample(self, u: np.ndarray) -> EmitterSamples:
+        """The points that ``u`` (N, 3) in [0, 1) pick: a triangle by its share of the power, evenly on it."""
+        emitter = np.minimum(np.searchsorted(self._end, u[:, 2], side="right"), self.count - 1)
+        root = np.sqrt(u[:, 0])
+        barycentric = np.stack([root * (1 - u[:, 1]), root * u[:, 1]], axis=1)
+        triangle = self._triangle[emitter]
+        point = self.scene.triangles[triangle, 0] + np.einsum("ne,nei->ni", barycentric, self._edge[emitter])
+        radiance = self.scene.emission(triangle, barycentric)
+        radiance[self.scene.is_hole(triangle, barycentric)] = 0.0
+        return EmitterSamples(point, self._normal[emitter], radiance, self.density[triangle])
+
+    # At surfaces
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def irradiance(
+        self, points: np.ndarray, origins: np.ndarray, normals: np.ndarray, keys: np.ndarray, index
+    ) -> np.ndarray:
+        """(N, 3) irradiance at ``points`` (N, 3) by sample ``index`` of the sequences of ``keys`` (N, 3): one point on
+        the emitters and one direction about the normal, weighted by the balance heuristic. Rays start at ``origins``
+        (N, 3)."""
+        return self._by_points(points, origins, normals, keys, index) + self._by_directions(
+            origins, normals, keys, index
+        )
+
+    def unshadowed(self, points: np.ndarray, normals: np.ndarray, keys: np.ndarray, index) -> np.ndarray:
+        """(N, 3) irradiance by one point on the emitters if nothing stands between."""
+        return self._arrival(self.sample(sample_r3(keys, index).astype(float)), points, normals).irradiance
+
+    def _arrival(self, emitter: EmitterSamples, points: np.ndarray, normals: np.ndarray) -> _Arrival:
+        """What points on the emitters answer for."""
+        offset = emitter.point - points
+        squared = np.maximum(np.einsum("ni,ni->n", offset, offset), 1e-20)
+        distance = np.sqrt(squared)
+        direction = offset / distance[:, None]
+        surface_cosine = np.maximum(np.einsum("ni,ni->n", direction, normals), 0.0)
+        emitter_cosine = np.abs(np.einsum("ni,ni->n", direction, emitter.normal))
+        share = self._point_share(emitter.density, distance, surface_cosine, emitter_cosine)
+        factor = surface_cosine * emitter_cosine / (squared * emitter.density) * share
+        return _Arrival(emitter.radiance * factor[:, None], direction, distance)
+
+    def _point_share(self, density, distance, surface_cosine, emitter_cosine) -> np.ndarray:
+        """(N,) share of the light from an emitter that points on emitters answer for; directions about the normal
+        answer for the rest, within ``reach``."""
+        points = density * distance * distance
+        directions = surface_cosine * emitter_cosine / np.pi
+        return np.where(distance >= self.reach, 1.0, points / np.maximum(points + directions, 1e-300))
+
+    def _by_points(self, points, origins, normals, keys, index) -> np.ndarray:
+        """Resampled: CANDIDATES points by power, one of them by what it would send if nothing stood between; a single
+        number chooses among them one after the other."""
+        choice = sample_r3(shifted(keys, _CHOICE_STREAM, 0, 0), index)[:, 0].astype(float)
+        best = _Arrival(np.zeros_like(points), np.zeros_like(points), np.zeros(len(points)))
+        best_weight, total = np.zeros(len(points)), np.zeros(len(points))
+        for candidate in range(CANDIDATES):
+            u = sample_r3(keys, np.asarray(index) * CANDIDATES + candidate).astype(float)
+            arrival = self._arrival(self.sample(u), points, normals)
+            weight = arrival.irradiance.sum(axis=1)
+            total += weight
+            taken = (weight > 0) & (choice * total < weight)
+            left = ~taken & (total > weight)
+            choice[taken] *= total[taken] / weight[taken]
+            choice[left] = (choice[left] * total[left] - weight[left]) / (total[left] - weight[left])
+            best_weight[taken] = weight[taken]
+            for name in ("irradiance", "direction", "distance"):
+                getattr(best, name)[taken] = getattr(arrival, name)[taken]
+        lit = np.flatnonzero(best_weight > 0)
+        lit = lit[self.scene.visible(origins[lit], best.direction[lit], best.distance[lit] * _SHADOW_END)]
+        result = np.zeros_like(points)
+        result[lit] = best.irradiance[lit] * (total[lit] / (best_weight[lit] * CANDIDATES))[:, None]
+        return result
+
+    def _by_directions(self, origins, normals, keys, index) -> np.ndarray:
+        u = sample_r2(shifted(keys, 0, _DIRECTION_STREAM, 0), index).astype(float)
+        direction = sample_cosine(normals, u)
+        hits = self.scene.closest(origins, direction)
+        found = np.flatnonzero((hits.triangle >= 0) & (hits.distance < self.reach))
+        found = found[self.density[hits.triangle[found]] > 0]
+        triangle, direction = hits.triangle[found], direction[found]
+        edge = self.scene.triangles[triangle, 1:] - self.scene.triangles[triangle, :1]
+        normal = np.cross(edge[:, 0], edge[:, 1])
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        share = self._point_share(
+            self.density[triangle],
+            hits.distance[found],
+            np.einsum("ni,ni->n", direction, normals[found]),
+            np.abs(np.einsum("ni,ni->n", direction, normal)),
+        )
+        result = np.zeros_like(origins)
+        radiance = self.scene.emission(triangle, hits.barycentric[found])
+        result[found] = radiance * ((1.0 - share) * np.pi)[:, None]
+        return result
+
+    # At probes
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def project(
+        self, node: int, position: np.ndarray, seen: Surfaces, directions: np.ndarray, settings, counts: tuple[int, int]
+    ) -> np.ndarray:
+        """(K, 3) coefficients of what the probe of grid ``node`` at ``position`` (3,) sees of the emitters.
+
+        ``seen`` are its texels (X), ``directions`` (X, 3). ``counts``: points considered, and rays that some of them
+        get. Every place on an emitter belongs to texels or to points, whichever are denser as the probe sees it.
+        """
+        solid_angles = np.tile(texel_solid_angles(settings.face).ravel(), 6)
+        texel = np.flatnonzero(seen.triangle >= 0)
+        texel = texel[self.density[seen.triangle[texel]] > 0]
+        cosine = np.maximum(np.abs(np.einsum("xi,xi->x", directions[texel], seen.normal[texel])), 1e-4)
+        density = counts[0] * self.density[seen.triangle[texel]] * seen.distance[texel] ** 2 / cosine
+        texel = texel[density * solid_angles[texel] < 1.0]
+        by_texels = sh.project(seen.emission[texel], directions[texel], solid_angles[texel], settings.bands)
+
+        index = np.arange(counts[0])
+        keys = np.broadcast_to(keys_of(np.array(node), _PROBE_STREAM, settings.seed), (len(index), 3))
+        place = sample_r2(keys, index).astype(float)
+        jitter = sample_r2(shifted(keys, 1, 0, 0), index)[:, 0].astype(float)
+        emitter = self.sample(np.column_stack([place, (index + jitter) / counts[0]]))
+        offset = emitter.point - position
+        distance = np.sqrt(np.maximum(np.einsum("ni,ni->n", offset, offset), 1e-20))
+        direction = offset / distance[:, None]
+        cosine = np.maximum(np.abs(np.einsum("ni,ni->n", direction, emitter.normal)), 1e-4)
+        density = counts[0] * emitter.density * distance**2 / cosine
+        face, row, column = direction_to_texel(direction, settings.face)
+        in_texels = density * solid_angles[(face * settings.face + row) * settings.face + column] < 1.0
+        radiance = np.where(in_texels[:, None], 0.0, emitter.radiance / density[:, None])
+        weight = radiance.sum(axis=1)
+        if not weight.any():
+            return by_texels
+        # One ray each time the running sum of the weights has grown by an equal step.
+        step = weight.sum() / counts[1]
+        passed = np.floor(np.cumsum(weight) / step + 0.5)
+        rays = np.diff(passed, prepend=0.0)
+        sent = np.flatnonzero(rays)
+        origins = np.broadcast_to(position, (len(sent), 3))
+        sent = sent[self.scene.visible(origins, direction[sent], distance[sent] * _SHADOW_END)]
+        share = rays[sent] * step / weight[sent]
+        return by_texels + sh.project(radiance[sent], direction[sent], share, settings.bands)

@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light between patches, readable and slow: the twin of gpu_shaders/patch_light.py and its shaders patch_visible_comp,
+patch_spread_comp, patch_direct_comp, patch_rays_comp, patch_carried_comp and patch_iterate_comp.
+
+What a patch is, core/patches.py decides for both. Every stage can be asked by itself, with what another machine found
+before it.
+
+N patches, R rays of each; ``points`` (N, K, 4) are K places of each patch, position relative to the volume's centre and
+packed normal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import direct_light
+from .conventions import LUMINANCE
+from .cubemap import direction_to_texel, octahedral_encode, pack_normal, unpack_normal
+from .emitters import sampling_density
+from .grid import Grid
+from .patches import MOST_ROUNDS, NO_PATCH, RAYS, SAMPLES, Patches, direct_samples, effort
+from .rays import leave_surface, step_off
+from .reference_emitters import ReferenceEmitters
+from .reference_scene import ReferenceScene
+from .sampling import keys_of, light_keys, sample_cosine, sample_r2, shifted
+from .settings import BakeSettings
+from .world_map import world_texels
+
+_RAISE = 0.15  # of the distance between hit and leader: both ends of a line of sight are raised by it
+_RAY_STREAM, _PATH_LIGHT_STREAM = 0x85EBCA6B, 0x1B873593
+_EMITTER_STREAM = 0x2545F491
+_RAY_SPREAD = 0.5  # radians: rays between patches see images blurred
+
+
+@dataclass
+class PatchRays:
+    """What rays found: ``hits`` (N, R, 4) position and packed normal, −1 where nothing more can come; ``carried`` (N,
+    R, 3) radiance that they brought along; ``reflected`` (N, R, 3) product of the albedos on the way."""
+
+    hits: np.ndarray
+    carried: np.ndarray
+    reflected: np.ndarray
+
+    @property
+    def brought(self) -> np.ndarray:
+        """(N, 3) irradiance of what the rays of each patch carry."""
+        return np.pi * self.carried.mean(axis=1)
+
+
+class ReferenceLight:
+    """All patches of one bake and their light. ``direct`` (N, 3) and ``irradiance`` (N, 3)."""
+
+    def __init__(self, scene: ReferenceScene, grid: Grid, settings: BakeSettings):
+        self.scene, self.settings = scene, settings
+        self.patches = Patches(grid)
+        self.emitters = ReferenceEmitters(scene, sampling_density(scene.snapshot, grid))
+        self.direct = np.zeros((0, 3))
+        self._world = world_texels(scene.snapshot.world, settings.face).reshape(-1, 3)
+        self._effort = 1
+
+    # Which patch
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def bind_texels(self, hits: np.ndarray, distance: np.ndarray) -> np.ndarray:
+        """(H,) patches of texels ``hits`` (H, 4) seen from ``distance`` (H,) metres."""
+        return self.patches.bind(hits, distance, self._sees(hits))
+
+    def _sees(self, hits: np.ndarray):
+        return lambda items, patches: self.sees_leader(hits[items], self.patches.points[patches, 0])
+
+    def sees_leader(self, hits: np.ndarray, leaders: np.ndarray) -> np.ndarray:
+        """(H,) bool: does nothing stand between ``hits`` and ``leaders`` (H, 4 each), raised off their surfaces?"""
+        apart = np.linalg.norm(hits[:, :3].astype(float) - leaders[:, :3], axis=1)
+        ends = []
+        for end in (hits, leaders):
+            point, normal = _split(end)
+            ends.append(leave_surface(point, normal) + normal * (_RAISE * apart)[:, None])
+        offset = ends[1] - ends[0]
+        range_ = np.linalg.norm(offset, axis=1)
+        direction = offset / np.maximum(range_, 1e-300)[:, None]
+        result = np.ones(len(hits), bool)
+        far = np.flatnonzero(range_ > 0)
+        result[far] = self.scene.visible(ends[0][far], direction[far], range_[far])
+        return result
+
+    # Direct light
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def light_new_patches(self) -> None:
+        """Direct light of the patches that were bound since the last call."""
+        lit = len(self.direct)
+        if lit == self.patches.count:
+            return
+        if lit == 0:
+            self._effort = effort(self.patches.count, self.settings.samples)
+        numbers = np.arange(lit, self.patches.count)
+        sample_class = direct_samples(*self.spread(self.patches.points, numbers))
+        direct = np.zeros((len(numbers), 3))
+        for index, samples in enumerate(SAMPLES):
+            chosen = np.flatnonzero(sample_class == index)
+            direct[chosen] = self.direct_light(self.patches.points, numbers[chosen], samples * self._effort)
+        self.direct = np.concatenate([self.direct, direct])
+
+    def spread(self, points: np.ndarray, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and standard deviation (C,) of the luminance of the irradiance at the points of the patches ``numbers``
+        (C,) if nothing stands between."""
+        keys = keys_of(numbers, 0, self.settings.seed)
+        luminance = []
+        for index in range(points.shape[1]):
+            point, normal = _split(points[numbers, index])
+            irradiance = self._lamps(point, point, normal, keys, index, shadows=False)
+            if self.emitters.count:
+                irradiance += self.emitters.unshadowed(point, normal, keys, index)
+            luminance.append(irradiance @ LUMINANCE)
+        return np.mean(luminance, axis=0), np.std(luminance, axis=0)
+
+    def direct_light(self, points: np.ndarray, numbers: np.ndarray, samples: int, first_key: int = 0) -> np.ndarray:
+        """(C, 3) irradiance of lamps and emitters: mean over ``samples`` places spread over the points of the patches
+        ``numbers`` (C,)."""
+        keys = keys_of(first_key + numbers, 0, self.settings.seed)
+        total = np.zeros((len(numbers), 3))
+        each = points.shape[1]
+        for index in range(samples):
+            place = index * each // samples if samples < each else index % each
+            point, normal = _split(points[numbers, place])
+            origin = leave_surface(point, normal)
+            total += self._irradiance(point, origin, normal, keys, shifted(keys, 0, 0, _EMITTER_STREAM), index)
+        return total / samples
+
+    def _irradiance(self, point, origin, normal, lamp_keys, emitter_keys, index) -> np.ndarray:
+        irradiance = self._lamps(point, origin, normal, lamp_keys, index)
+        if self.emitters.count:
+            irradiance += self.emitters.irradiance(point, origin, normal, emitter_keys, index)
+        return irradiance
+
+    def _lamps(self, point, origin, normal, keys, index, shadows: bool = True) -> np.ndarray:
+        """(C, 3) irradiance of all lamps by sample ``index`` of the sequences of ``keys`` (C, 3)."""
+        total = np.zeros_like(point)
+        visible = self.scene.visible if shadows else lambda origins, directions, limits: np.ones(len(origins), bool)
+        for number, light in enumerate(self.scene.snapshot.lights):
+            u = sample_r2(light_keys(keys, number), index).astype(float)
+            total += direct_light.irradiance(light, point + self.scene.origin, origin, normal, u, visible)
+        return total
+
+    # Rays
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def trace(
+        self, points: np.ndarray, numbers: np.ndarray, rays_each: int, segments: int = 1, first_key: int = 0
+    ) -> PatchRays:
+        """``rays_each`` rays of each of the patches ``numbers`` (C,). With ``segments`` above 1 they go on as paths,
+        and direct light is sampled where they bounce."""
+        patch, index = np.repeat(numbers, rays_each), np.tile(np.arange(rays_each), len(numbers))
+        at = points[patch, index * points.shape[1] // rays_each % points.shape[1]]
+        point, normal = _split(at)
+        origin = leave_surface(point, normal)
+        keys = keys_of(first_key + patch, _RAY_STREAM, self.settings.seed)
+        hits = np.zeros((len(patch), 4))
+        carried, reflected = np.zeros((len(patch), 3)), np.where(at[:, 3:] < 0, 0.0, np.ones((len(patch), 3)))
+        for segment in range(segments):
+            alive = np.flatnonzero(reflected.any(axis=1))
+            u = sample_r2(shifted(keys[alive], 0, segment, 0), index[alive]).astype(float)
+            direction = sample_cosine(normal[alive], u)
+            found = self.scene.closest(origin[alive], direction)
+            surface = self.scene.resolve(found, direction, _RAY_SPREAD)
+            missed = found.triangle < 0
+            face, row, column = direction_to_texel(direction, self.settings.face)
+            background = self._world[(face * self.settings.face + row) * self.settings.face + column]
+            sampled = ~missed & (self.emitters.density[found.triangle] > 0)
+            seen = np.where(missed[:, None], background, np.where(sampled[:, None], 0.0, surface.emission))
+            carried[alive] += reflected[alive] * seen
+            reflected[alive] *= surface.albedo  # zero where a ray missed
+            position = origin[alive] + direction * np.where(missed, 0.0, found.distance)[:, None]
+            hits[alive, :3] = position
+            hits[alive, 3] = _pack(surface.normal, ~missed)
+            if segment < segments - 1:
+                on = reflected[alive].any(axis=1)
+                alive, surface_normal = alive[on], surface.normal[on]
+                start = step_off(position[on], surface_normal, -direction[on], found.distance[on])
+                here = shifted(keys[alive], 0, _PATH_LIGHT_STREAM + segment, 0)
+                arriving = self._irradiance(position[on], start, surface_normal, here, here, index[alive])
+                carried[alive] += reflected[alive] * arriving / np.pi
+                normal[alive], origin[alive] = surface_normal, start
+        hits[~reflected.any(axis=1)] = (0.0, 0.0, 0.0, -1.0)
+        shape = (len(numbers), rays_each)
+        return PatchRays(*(values.reshape(*shape, -1) for values in (hits, carried, reflected)))
+
+    def connect(self) -> None:
+        """Traces rays between patches until they find no surface that is no patch yet."""
+        rays_each = RAYS * self._effort
+        parts, ends = [], []
+        stop = 0
+        for round_ in range(MOST_ROUNDS):
+            start, stop = stop, self.patches.count
+            if start == stop:
+                break
+            rays = self.trace(self.patches.points, np.arange(start, stop), rays_each)
+            parts.append(rays)
+            ends.append(self._bind_ends(rays.hits, round_).reshape(-1, rays_each))
+        self.light_new_patches()
+        self._ends = np.concatenate(ends)
+        self._brought = np.concatenate([rays.brought for rays in parts])
+        self._reflected = np.concatenate([rays.reflected for rays in parts])
+
+    def _bind_ends(self, hits: np.ndarray, round_: int) -> np.ndarray:
+        hits = hits.reshape(-1, 4).astype(np.float32)
+        return self.patches.bind_ends(hits, round_, self._sees(hits))
+
+    # Bounces
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def iterate(self, bounces: int) -> np.ndarray:
+        """(N, 3) irradiance after ``bounces`` bounces."""
+        irradiance = self.direct
+        for _ in range(bounces):
+            irradiance = bounce(self.direct, self._brought, self._reflected, self._ends, irradiance)
+        return irradiance
+
+    def gather(self, hits: np.ndarray, rays_each: int, irradiance: np.ndarray, first_key: int) -> np.ndarray:
+        """(H, 3) irradiance of texels ``hits`` (H, 4) by light and paths of their own, the last segment of which ends
+        on patches of ``irradiance`` (N, 3)."""
+        points, numbers = hits[:, None].astype(np.float32), np.arange(len(hits))
+        direct = np.zeros((len(hits), 3))
+        lit = np.flatnonzero(hits[:, 3] >= 0)
+        direct[lit] = self.direct_light(points, lit, self.settings.samples, first_key)
+        rays = self.trace(points, numbers, rays_each, self.settings.gather, first_key)
+        ends = self._bind_ends(rays.hits, MOST_ROUNDS - 1).reshape(len(hits), -1)
+        return bounce(direct, rays.brought, rays.reflected, ends, irradiance)
+
+
+def bounce(
+    direct: np.ndarray, brought: np.ndarray, reflected: np.ndarray, ends: np.ndarray, irradiance: np.ndarray
+) -> np.ndarray:
+    """(C, 3) direct light + what rays brought along + mean over rays of albedo · ``irradiance`` (N, 3) where they end.
+
+    Rays are cosine-weighted, so π·mean(radiance) is the irradiance and π cancels against albedo/π. Ends (C, R) that
+    lie on no patch are left out of the mean, so that a furnace stays a furnace.
+    """
+    coming = np.where((ends >= 0)[..., None], reflected * irradiance[np.maximum(ends, 0)], 0.0)
+    counted = np.maximum((ends != NO_PATCH).sum(axis=1), 1)
+    return direct + brought + coming.sum(axis=1) / counted[:, None]
+
+
+def _split(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and normals (C, 3 each) of places (C, 4), float64."""
+    at = at.astype(float)
+    return at[:, :3], unpack_normal(np.maximum(at[:, 3], 0.0))
+
+
+def _pack(normals: np.ndarray, surface: np.ndarray) -> np.ndarray:
+    """(C,) packed ``normals`` (C, 3), −1 where there is no ``surface`` (C,)."""
+    packed = np.full(len(normals), -1.0)
+    packed[surface] = pack_normal(octahedral_encode(normals[surface]))
+    return packed

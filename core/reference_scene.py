@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What rays meet, readable and slow: every ray against every triangle, and what the surface there is made of.
+
+Readable twin of surface_lib.glsl, for scenes of some hundred triangles. Images are half floats, as the GPU stores them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import rays
+from .images import sample_image
+from .snapshot import NO_IMAGE, SceneSnapshot
+
+
+@dataclass
+class Surfaces:
+    """What rays (…) meet. ``distance`` is infinite where that is background."""
+
+    distance: np.ndarray  # (…) metres
+    triangle: np.ndarray  # (…) int, −1 background
+    back: np.ndarray  # (…) bool: seen from behind
+    normal: np.ndarray  # (…, 3) shading normal on the viewer's side
+    albedo: np.ndarray  # (…, 3)
+    emission: np.ndarray  # (…, 3) radiance
+
+
+class ReferenceScene:
+    """``snapshot`` with positions relative to ``origin`` (3,), as everything here takes and returns them."""
+
+    def __init__(self, snapshot: SceneSnapshot, origin: np.ndarray):
+        self.snapshot = snapshot
+        self.origin = np.asarray(origin, float)
+        self.triangles = snapshot.triangle_positions - self.origin
+        clips = np.array([material.alpha_threshold > 0 for material in snapshot.materials])
+        self._clipped = clips[snapshot.material_index]
+
+    def closest(self, origins: np.ndarray, directions: np.ndarray) -> rays.Hits:
+        """Nearest hits of rays ``origins``, ``directions`` (N, 3)."""
+        return rays.closest_hit(self.triangles, origins, directions, self._hole_test())
+
+    def visible(self, origins: np.ndarray, directions: np.ndarray, limits: np.ndarray) -> np.ndarray:
+        """(N,) bool: does nothing lie on the rays nearer than ``limits`` (N,)?"""
+        return ~rays.any_hit(self.triangles, origins, directions, limits, self._hole_test())
+
+    def _hole_test(self):
+        return self.is_hole if self._clipped.any() else None
+
+    def is_hole(self, triangle: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """(K,) bool: is the material of ``triangle`` (K,) clipped away at ``barycentric`` (K, 2)? Images at full
+        resolution."""
+        hole = np.zeros(len(triangle), bool)
+        for index, material in enumerate(self.snapshot.materials):
+            here = np.flatnonzero((self.snapshot.material_index[triangle] == index) & self._clipped[triangle])
+            alpha = np.full(len(here), float(material.alpha))
+            if material.alpha_image != NO_IMAGE and len(here):
+                texel = self._image(material.alpha_image, triangle[here], barycentric[here])
+                alpha *= texel[:, :3].mean(axis=1) if material.alpha_from_color else texel[:, 3]
+            hole[here] = alpha < material.alpha_threshold
+        return hole
+
+    def emission(self, triangle: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """(K, 3) radiance that ``triangle`` (K,) sends at ``barycentric`` (K, 2), images at full resolution."""
+        radiance = np.zeros((len(triangle), 3))
+        for index, material in enumerate(self.snapshot.materials):
+            here = np.flatnonzero(self.snapshot.material_index[triangle] == index)
+            radiance[here] = material.emission
+            if material.emission_image != NO_IMAGE:
+                radiance[here] *= self._image(material.emission_image, triangle[here], barycentric[here])[:, :3]
+        return radiance
+
+    def _image(self, image: int, triangle: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        uv = interpolate(self.snapshot.corner_uvs[triangle], barycentric)
+        return sample_image(self.snapshot.images[image], uv, np.zeros(len(uv)))
+
+    def resolve(self, hits: rays.Hits, directions: np.ndarray, spread: float) -> Surfaces:
+        """Surfaces where rays along ``directions`` (N, 3) hit; fields of rays that hit nothing are zero. ``spread`` is
+        the angular width of the view in radians, which picks the mip level of images."""
+        count = len(directions)
+        surfaces = Surfaces(
+            hits.distance, hits.triangle, np.zeros(count, bool), *(np.zeros((count, 3)) for _ in range(3))
+        )
+        hit = np.flatnonzero(hits.triangle >= 0)
+        triangle, barycentric, direction = hits.triangle[hit], hits.barycentric[hit], directions[hit]
+        edge = self.triangles[triangle, 1:] - self.triangles[triangle, :1]
+        geometric = np.cross(edge[:, 0], edge[:, 1])
+        facing = np.einsum("ni,ni->n", geometric, direction)
+        surfaces.back[hit] = facing > 0
+        normal = interpolate(self.snapshot.corner_normals[triangle], barycentric)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        surfaces.normal[hit] = np.where(facing[:, None] > 0, -normal, normal)
+
+        # Width of what the view covers on the surface, in uv: distance × angle, stretched by the slant, × uv units per
+        # metre.
+        uv = interpolate(self.snapshot.corner_uvs[triangle], barycentric)
+        slant = np.maximum(np.abs(facing) / np.linalg.norm(geometric, axis=1), 0.1)
+        footprint = hits.distance[hit] * spread / np.sqrt(slant) * self._uv_per_metre()[triangle]
+        for index, material in enumerate(self.snapshot.materials):
+            here = np.flatnonzero(self.snapshot.material_index[triangle] == index)
+            albedo = np.tile(np.array(material.base_color, float) * material.diffuse_share, (len(here), 1))
+            emission = np.tile(np.array(material.emission, float), (len(here), 1))
+            for values, image in ((albedo, material.base_image), (emission, material.emission_image)):
+                if image != NO_IMAGE:
+                    values *= sample_image(self.snapshot.images[image], uv[here], footprint[here])[:, :3]
+            surfaces.albedo[hit[here]], surfaces.emission[hit[here]] = albedo, emission
+        return surfaces
+
+    def _uv_per_metre(self) -> np.ndarray:
+        """(T,) square root of a triangle's area in uv over its area in the world."""
+        edge = self.triangles[:, 1:] - self.triangles[:, :1]
+        uv_edge = self.snapshot.corner_uvs[:, 1:].astype(float) - self.snapshot.corner_uvs[:, :1]
+        uv_area = np.abs(np.linalg.det(uv_edge))
+        return np.sqrt(uv_area / np.maximum(np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1), 1e-30))
+
+
+def interpolate(values: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+    """(N, C) blend of corner ``values`` (N, 3, C) by the weights of corners 1 and 2, (N, 2)."""
+    first = 1 - barycentric.sum(axis=1, keepdims=True)
+    return values[:, 0] * first + values[:, 1] * barycentric[:, :1] + values[:, 2] * barycentric[:, 1:]
