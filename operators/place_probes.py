@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty
 
+from .. import viewport
 from ..core.conventions import ACTIVE, CULLED
 from ..core.culling import needed_nodes
 from ..core.errors import GridlightError, InputError
@@ -45,6 +46,7 @@ class GRIDLIGHT_OT_place_probes(bpy.types.Operator):
         text = f"{active} of {total} probes placed; {total - active} light nothing and are culled"
         if any((state == ACTIVE).sum() > probe_objects.OBJECT_LIMIT for state in states):
             text += f". More than {probe_objects.OBJECT_LIMIT} in a volume are shown as points, not as objects"
+        viewport.sync(scene)
         self.report({"INFO"}, text)
         return {"FINISHED"}
 

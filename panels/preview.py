@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..operators import names
 from ..operators.volume_choice import volumes_of
 from ..scene.field_storage import stored_text
 from .sidebar_panel import SidebarPanel, paragraph
@@ -26,6 +27,7 @@ class GRIDLIGHT_PT_preview(SidebarPanel, bpy.types.Panel):
             text="Preview On" if preview.enabled else "Preview",
             icon="HIDE_OFF" if preview.enabled else "HIDE_ON",
         )
+        layout.operator(names.EXPLORE, icon="VIEW_PERSPECTIVE")
         if not any(stored_text(volume) for volume in volumes_of(context.scene)):
             paragraph(layout, context, "Nothing is baked yet: only direct light will be seen", "INFO")
         if not preview.enabled:
@@ -37,6 +39,7 @@ class GRIDLIGHT_PT_preview(SidebarPanel, bpy.types.Panel):
         column.prop(preview, "exposure")
         column.prop(preview, "tone_curve")
         column.prop(preview, "indirect", slider=True)
+        column.prop(preview, "highlight", slider=True)
 
 
 class GRIDLIGHT_PT_preview_probes(SidebarPanel, bpy.types.Panel):

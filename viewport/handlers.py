@@ -13,7 +13,7 @@ from bpy.app.handlers import persistent
 
 from ..gpu_shaders.viewport_pass import Probes, display
 from ..gpu_shaders.viewport_shading import Shading
-from . import changes, hud, sessions
+from . import changes, hud, points, sessions
 from .view_images import ViewImages
 
 ENGINE = "GRIDLIGHT"
@@ -45,6 +45,7 @@ def sync(_scene: bpy.types.Scene | None = None) -> None:
     """Makes what runs match what the scenes ask for."""
     if bpy.app.background:
         return
+    points.sync()
     wanted = any(scene.gridlight.preview.enabled for scene in bpy.data.scenes)
     if wanted and not _draw_handles:
         add = bpy.types.SpaceView3D.draw_handler_add
@@ -73,6 +74,7 @@ def start() -> None:
 
 def stop() -> None:
     """Frees everything and takes all handlers away but those for loading."""
+    points.stop()
     _remove_draw_handlers()
     sessions.drop_all()
     images.clear()

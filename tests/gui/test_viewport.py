@@ -318,3 +318,29 @@ def test_light_follows_a_lamp_that_moves(person):
     stored = person.module("scene.field_storage").load_field(volume)
     assert not stored.coefficients.any(), "what was baked and stored is not changed by looking"
     preview.enabled, preview.show_rate = False, False
+
+
+@in_blender(backends=("opengl",))
+def test_many_probes_are_points(person):
+    lit_room.build(person)
+    space = lit_room.view(person, distance=14.0)
+    space.overlay.show_overlays = True
+    space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
+    volume = bpy.data.objects["Room"]
+    volume.gridlight_grid.resolution = (20, 20, 20)
+    bpy.data.objects["Cube"].display_type = "WIRE"
+
+    def orange():
+        red, green, blue = np.moveaxis(lit_room.middle(person), 2, 0)
+        return ((red > 180) & (green < 0.9 * red) & (blue < 0.7 * green)).mean()
+
+    bpy.context.view_layer.objects.active = volume
+    person.do("gridlight.place_probes")
+    yield 1.0
+    person.picture("points")
+    assert orange() > 0.02
+    with person.at_viewport():
+        bpy.ops.ed.undo()
+    yield 1.0
+    assert orange() < 0.001
+    person.module("viewport.points").stop()
