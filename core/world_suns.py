@@ -2,8 +2,8 @@
 """Suns in an environment map, taken out of it and made lamps.
 
 A sun of a few pixels holds most of a sky's light, and rays that leave a surface at random would find it once in ten
-thousand. What stands far out of the map is therefore sampled like a sun lamp of the same direction, size and irradiance;
-rays see the rest. Probes see the whole map: there a texel holds its mean (core/world_map.py).
+thousand. What stands far out of the map is therefore sampled like a sun lamp of the same direction, size and
+irradiance; rays see the rest. Probes see the whole map: there a texel holds its mean (core/world_map.py).
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ _MOST_SUNS = 8
 def extract_suns(world: World) -> tuple[World, list[Light]]:
     """The world without its suns, and the suns as lamps. Together they send what ``world`` sends, to rounding.
 
-    A lamp's colour is the irradiance on a surface that faces it. Its disc is as large as the sun's bright part: the solid
-    angle (∫L)²/∫L².
+    A lamp's colour is the irradiance on a surface that faces it. Its disc is as large as the sun's bright part: the
+    solid angle (∫L)²/∫L².
     """
     if world.map is None:
         return world, []
