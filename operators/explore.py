@@ -60,7 +60,7 @@ class GRIDLIGHT_OT_explore(bpy.types.Operator):
         return context.area is not None and context.area.type == "VIEW_3D" and context.mode == "OBJECT"
 
     def invoke(self, context, event):
-        from ..viewport import handlers, walk  # they draw, so only where there is a view
+        from ..viewport import walk  # draws, so only where there is a view
         from ..viewport.explore_overlay import ExploreOverlay
 
         if _running:
@@ -72,7 +72,6 @@ class GRIDLIGHT_OT_explore(bpy.types.Operator):
         self._preview = context.scene.gridlight.preview
         self._was_enabled = self._preview.enabled
         self._preview.enabled = True
-        self._session = handlers.request(context.scene)
         self._walker = walk.Walker(space, region_3d, _walking_speed(context.scene))
         self._overlay = ExploreOverlay()
         self._overlay.say(f"F1: help   Esc: leave   {self._walker.speed:.1f} m/s")
@@ -122,7 +121,7 @@ class GRIDLIGHT_OT_explore(bpy.types.Operator):
             name = group.replace("_", " ").capitalize()
             say(f"{name}: no light is in this group" if value is None else f"{name}: {value:.0%}")
         elif key in {"MINUS", "PLUS"}:
-            self._paint(1 if key == "PLUS" else -1)
+            self._paint(context, 1 if key == "PLUS" else -1)
         elif key == "NINE":
             say("Animation on" if self._animation.toggle() else "Animation off")
         elif key in {"PAGE_UP", "PAGE_DOWN"}:
@@ -139,8 +138,8 @@ class GRIDLIGHT_OT_explore(bpy.types.Operator):
             self._screenshot(context)
         self._area.tag_redraw()
 
-    def _paint(self, step: int) -> None:
-        walls = actions.wall_materials(self._scene, self._session.snapshot)
+    def _paint(self, context, step: int) -> None:
+        walls = actions.wall_materials(context, self._walker.eye)
         if not walls:
             self._overlay.say("No material to paint: walls need a plain base colour")
             return

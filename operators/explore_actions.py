@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import tempfile
+from collections import Counter
 from pathlib import Path
 
 import bpy
 import numpy as np
-
-from ..core.snapshot import SceneSnapshot
+from mathutils import Vector
 
 WALL_MARK = "gridlight_walls"  # custom property of materials that are meant when there is talk of walls
 # Reflectance of paints, linear: white, warm grey, ochre, brick, crimson, plum, navy, teal, moss.
@@ -24,6 +24,7 @@ WALL_COLORS = (
     (0.05, 0.28, 0.27),
     (0.15, 0.25, 0.08),
 )
+_LOOKS = 24  # directions around the eye in which walls are looked for
 _STEP = 2.0**0.5  # intensity per key press
 _LEAST = 1 / 64  # darker than this is off
 
@@ -42,24 +43,34 @@ def change_intensity(scene: bpy.types.Scene, group: str, brighter: bool) -> floa
     return members[0].gridlight_light.intensity if members else None
 
 
-def wall_materials(scene: bpy.types.Scene, snapshot: SceneSnapshot | None) -> list[bpy.types.Material]:
-    """Materials marked as walls; where none is, the one that covers most upright surface."""
-    used = {slot.material for item in scene.objects for slot in item.material_slots if slot.material}
-    paintable = [material for material in used if _color_socket(material) is not None]
-    marked = [material for material in paintable if material.get(WALL_MARK)]
-    if marked or snapshot is None or not len(snapshot.triangles):
+def wall_materials(context: bpy.types.Context, eye: Vector) -> list[bpy.types.Material]:
+    """Materials marked as walls; where none is, the one that most of the walls around ``eye`` wear.
+
+    Materials whose colour comes from a texture cannot be painted and do not count.
+    """
+    used = {slot.material for item in context.scene.objects for slot in item.material_slots if slot.material}
+    marked = [material for material in used if material.get(WALL_MARK) and _color_socket(material) is not None]
+    if marked:
         return marked
-    corners = snapshot.triangle_positions
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(across, axis=1)
-    upright = np.abs(across[:, 2]) < 0.3 * area
-    share = np.bincount(snapshot.material_index[upright], area[upright], len(snapshot.materials))
-    by_name = {material.name: material for material in paintable}
-    for index in np.argsort(-share, kind="stable"):
-        name = snapshot.materials[index].name
-        if share[index] > 0 and name in by_name:
-            return [by_name[name]]
-    return []
+    depsgraph = context.evaluated_depsgraph_get()
+    seen = Counter()
+    for angle in np.arange(_LOOKS) * (2 * np.pi / _LOOKS):
+        for rise in (-0.1, 0.1, 0.3):
+            direction = Vector((np.cos(angle), np.sin(angle), rise)).normalized()
+            hit, _, normal, face, item, _ = context.scene.ray_cast(depsgraph, eye, direction)
+            material = _material_of(item.evaluated_get(depsgraph), face) if hit and abs(normal.z) < 0.3 else None
+            if material is not None and _color_socket(material) is not None:
+                seen[material] += 1
+    return [seen.most_common(1)[0][0]] if seen else []
+
+
+def _material_of(item: bpy.types.Object, face: int) -> bpy.types.Material | None:
+    """Material of a face of an evaluated object, as it is in the file."""
+    if item.type != "MESH" or not item.material_slots:
+        return None
+    slot = min(item.data.polygons[face].material_index, len(item.material_slots) - 1)
+    material = item.material_slots[slot].material
+    return material.original if material else None
 
 
 def paint(materials: list[bpy.types.Material], index: int) -> None:

@@ -21,6 +21,8 @@ from .sessions import SceneSession
 
 SAMPLES = 16  # of a picture that stands still
 _MOVING_SECONDS = 0.05  # what a picture may take while the view moves; it gets coarser to keep that
+_STILL_SECONDS = 0.5  # between changes, from where on they count as single ones
+_SAMPLING_SECONDS = 0.01  # of a redraw, where the GPU takes more than one sample in that time
 _COARSEST = 8  # pixels along the edge of what is drawn as one
 
 
@@ -30,6 +32,7 @@ class _RegionImage:
 
     picture: Picture | None = None
     shown: tuple = ()
+    changed_at: float = 0.0
     coarseness: int = 1
     seconds_per_pixel: float = 0.0
     looked_up: tuple = ()  # when visibility was found out
@@ -78,12 +81,15 @@ class ViewImages:
             image.visible_flags.tobytes(),
         )
         if image.shown != wanted:
-            moving = bool(image.shown) and image.shown[1:3] != wanted[1:3]
-            image.shown = wanted
+            view_moves = bool(image.shown) and image.shown[1:3] != wanted[1:3]
+            since = time.perf_counter() - image.changed_at
+            # Where one picture takes longer than that, pictures in a row are movement all the same.
+            moving = view_moves or since < _STILL_SECONDS + 4 * image.seconds_per_pixel * region.width * region.height
+            image.shown, image.changed_at = wanted, time.perf_counter()
             self._restart(image, region, self._coarseness(image, region) if moving else 1)
         elif image.coarseness > 1:  # the view has come to rest
             self._restart(image, region, 1)
-        if image.picture.samples < SAMPLES:
+        for _ in range(self._samples_now(image)):
             started = time.perf_counter()
             session.gpu.drawing.draw(image.picture, view, shading, probes, image.visible, backdrop)
             if image.picture.samples == 1:
@@ -91,6 +97,14 @@ class ViewImages:
                 pixels = image.picture.width * image.picture.height
                 image.seconds_per_pixel = (time.perf_counter() - started) / pixels
         return image.picture, view
+
+    @staticmethod
+    def _samples_now(image: _RegionImage) -> int:
+        """Samples for this redraw: one, or as many as hardly take time."""
+        picture = image.picture
+        expected = image.seconds_per_pixel * picture.width * picture.height
+        quick = int(_SAMPLING_SECONDS / expected) if expected > 0 else 1
+        return min(max(quick, 1), SAMPLES - picture.samples)
 
     @staticmethod
     def _coarseness(image: _RegionImage, region: bpy.types.Region) -> int:

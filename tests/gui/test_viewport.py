@@ -332,7 +332,7 @@ def test_many_probes_are_points(person):
 
     def orange():
         red, green, blue = np.moveaxis(lit_room.middle(person), 2, 0)
-        return ((red > 180) & (green < 0.9 * red) & (blue < 0.7 * green)).mean()
+        return ((red > 180) & (green < 0.9 * red) & (green > 0.6 * red) & (blue < 0.7 * green)).mean()
 
     bpy.context.view_layer.objects.active = volume
     person.do("gridlight.place_probes")
