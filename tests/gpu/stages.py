@@ -2,20 +2,34 @@
 """One bake taken apart: every stage on the GPU, read back, beside the reference fed with what the GPU had before that
 stage."""
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from gridlight.core.conventions import INVALID
 from gridlight.core.cubemap import octahedral_decode
 from gridlight.core.field import Field
 from gridlight.core.orientation import inside_solid
-from gridlight.core.reference_bake import ReferenceBake, TexelSurfaces
+from gridlight.core.patches import POINTS
+from gridlight.core.reference_bake import ReferenceBake
+from gridlight.core.reference_scene import Surfaces
 from gridlight.gpu_shaders.backend import GpuBackend
+from gridlight.gpu_shaders.textures import allocate, read, upload
 from shader_runner import read_layers
 
 BACKGROUND = 1e29  # distances from here on
 
 
+@dataclass
+class Connections:
+    """Rays between patches as the GPU keeps them; N patches, R rays each."""
+
+    brought: np.ndarray  # (N, 3)
+    reflected: np.ndarray  # (N, R, 3)
+    ends: np.ndarray  # (N, R)
+
+
 class Stages:
-    """Captures ``snapshot`` for all of the grid's active probes at once."""
+    """Captures ``snapshot`` for all of the grid's active probes at once and finds their patches."""
 
     def __init__(self, snapshot, grid, settings, method="trace"):
         self.reference = ReferenceBake(snapshot, grid, settings)
@@ -26,10 +40,23 @@ class Stages:
         self.backend.allocate_field()
         self.gpu = self.backend.surfaces(0, len(nodes))
         self.capture(method)
+        self.backend.bind(self.gpu)
+
+    @property
+    def light(self):
+        return self.backend.light
 
     def capture(self, method):
         self.backend.capture(self.gpu, method)
-        self.object = self._texels("geometry")[..., 3]
+
+    def use_lights(self, lights):
+        """Other lamps for both."""
+        self.backend.scene.set_lights(lights, self.grid.center)
+        scene = self.reference.scene
+        scene.snapshot = replace(scene.snapshot, lights=lights)
+
+    # Texels
+    # ------------------------------------------------------------------------------------------------------------------
 
     def _texels(self, name):
         """(P, X, 4)"""
@@ -37,32 +64,97 @@ class Stages:
         layers = read_layers(self.gpu.textures[name], face, 6 * face, self.gpu.count)
         return layers.reshape(self.gpu.count, 6 * face * face, 4)
 
-    def triangles(self):
-        """(P, X) the triangle that each texel hit, as the snapshot counts; −1 background."""
-        face = self.settings.face
-        hits = read_layers(self.backend._hits.texture, face, face, 6 * self.gpu.count)[..., 0].astype(int)
-        hits = hits.reshape(self.gpu.count, 6 * face * face)
-        return np.where(hits >= 0, self.backend.scene.hierarchy.order[hits], -1)
-
     def surfaces(self):
         """The GPU's texel surfaces as the reference keeps them."""
         geometry, albedo, emission = (self._texels(name) for name in ("geometry", "albedo", "emission"))
         distance = np.abs(geometry[..., 2]).astype(float)
-        distance[distance > BACKGROUND] = np.inf
-        normal = octahedral_decode(geometry[..., :2])
-        return TexelSurfaces(
-            distance,
-            self.triangles(),
+        seen = distance < BACKGROUND
+        triangle = self.backend.scene.hierarchy.order[np.where(seen, geometry[..., 3], 0).astype(int)]
+        return Surfaces(
+            np.where(seen, distance, np.inf),
+            np.where(seen, triangle, -1),
             geometry[..., 2] < 0,
-            normal,
+            octahedral_decode(geometry[..., :2]),
             albedo[..., :3].astype(float),
             emission[..., :3].astype(float),
         )
 
+    def patch(self):
+        """(P, X) patches that texels lie on."""
+        return self._texels("albedo")[..., 3].astype(int)
+
+    def hits_texture(self):
+        return self.backend._texel_hits(self.gpu, 0, self.gpu.count)
+
+    def hits(self):
+        """(P·X, 4) position and packed normal of texels."""
+        return read(self.hits_texture(), self.gpu.count * 6 * self.settings.face**2)
+
+    def irradiance_at_texels(self, samples):
+        """(P, X, 3) direct light of each texel by itself, 0 where nothing reflects."""
+        hits = self.hits_texture()
+        count = self.gpu.count * 6 * self.settings.face**2
+        direct = allocate(count, "test")
+        self.light._light(hits, 1, np.flatnonzero(self.hits()[:, 3] >= 0), samples, direct)
+        return read(direct, count)[:, :3].reshape(self.gpu.count, -1, 3)
+
+    # Patches
+    # ------------------------------------------------------------------------------------------------------------------
+
+    @property
+    def points(self):
+        """(N, POINTS, 4)"""
+        return self.light.patches.points
+
+    def sees_leader(self, hits, patches):
+        """(H,) the GPU's word on which ``hits`` (H, 4) see the leader of their patch (H,)."""
+        return self.light._sees(upload(hits, "test"))(np.arange(len(hits)), patches)
+
+    def direct_of(self, patches, samples):
+        """(C, 3) direct light of ``patches`` (C,) by so many samples."""
+        direct = allocate(self.light.count, "test")
+        self.light._light(upload(self.points, "test"), POINTS, patches, samples, direct)
+        return read(direct, self.light.count)[patches, :3].astype(float)
+
+    def direct(self):
+        """(N, 3) direct light as the bake takes it."""
+        self.light.light_new_patches()
+        return read(self.light.direct, self.light.count)[:, :3].astype(float)
+
+    def rays(self, first, count, rays_each, segments=1):
+        """hits (C, R, 4), brought (C, 3), reflected (C, R, 3) of ``count`` patches from ``first``."""
+        found = self.light._trace(upload(self.points, "test"), POINTS, first, count, rays_each, segments)
+        hits, reflected = (read(texture, count * rays_each) for texture in (found.hits, found.reflected))
+        return (
+            hits.reshape(count, rays_each, 4),
+            read(found.brought, count)[:, :3],
+            reflected[:, :3].reshape(count, rays_each, 3),
+        )
+
+    def connect(self):
+        """Connections of all patches, among them those that only rays see."""
+        self.light.light_new_patches()
+        self.light.connect()
+        count, each = self.light.count, self.light._rays_each
+        return Connections(
+            read(self.light._brought, count)[:, :3].astype(float),
+            read(self.light._reflected, count * each)[:, :3].reshape(count, each, 3).astype(float),
+            read(self.light._ends, count * each // 4).reshape(count, each).astype(int),
+        )
+
+    def iterate(self, bounce):
+        """(N, 3) irradiance after one iteration more, and the sums that judge it."""
+        sums = self.light.iterate(bounce)
+        return read(self.light.irradiance, self.light.count)[:, :3].astype(float), sums
+
+    # Probes
+    # ------------------------------------------------------------------------------------------------------------------
+
     def statistics(self):
-        """The GPU's states and depth as a field without light."""
+        """The GPU's states and depth as a field without light. Needs direct light."""
         backend, nodes = self.backend, self.reference.nodes
-        backend.set_shells(self.reference.shells(self.surfaces(), self.source()))
+        reflected = self.reference.reflected(self.surfaces(), self.patch(), self.direct())
+        backend.set_shells(self.reference.shells(self.surfaces(), reflected))
         backend.statistics(self.gpu)
         shares = backend.read_shares()
         field = Field.empty(self.grid, self.settings.bands)
@@ -70,38 +162,15 @@ class Stages:
         field.state[nodes[inside_solid(shares)]] = INVALID
         field.validity[nodes] = 1 - shares[:, 0]
         field.depth[nodes] = backend.read_depth()
-        backend.set_states(field.state)
         return field
 
-    def source(self):
-        """(P, X, 3)"""
-        self.backend.direct_light(self.gpu)
-        return self._texels("source")[..., :3]
-
-    def lookups(self):
-        """Nodes (P, X, 8) and weights (P, X, 8) as stored, zero where there is no surface."""
-        self.backend.weigh_lookups(self.gpu)
-        weights = np.concatenate([self._texels("weights0"), self._texels("weights1")], axis=-1).astype(float)
-        first = self._texels("geometry")[..., 3].astype(int)
-        nx, ny, nz = self.grid.resolution
-        corner = np.arange(8)
-        step = (corner & 1) + nx * ((corner >> 1 & 1) + ny * (corner >> 2))
-        nodes = np.clip(first[..., None] + step, 0, self.grid.count - 1)
-        return nodes, np.where(first[..., None] >= 0, weights, 0.0)
-
-    def iterate(self, times):
-        """(P, K, 3) the field after ``times`` iterations."""
-        for index in range(times):
-            self.backend.iterate(self.gpu, read_field=index > 0)
-            self.backend.finish_iteration()
+    def project(self):
+        """(P, K, 3) the field by the newest irradiance, without sampled emitters."""
+        self.backend.project(self.gpu)
         return self.backend.read_field()
 
-    def reference_field(self, surfaces, source, field, lookups, times):
-        """The same by the reference."""
-        nodes, weights = lookups
-        total = weights.sum(axis=-1, keepdims=True)
-        lookups = nodes, weights / np.where(total > 0, total, 1)
-        field.coefficients = np.zeros((self.grid.count, self.settings.bands**2, 3))
-        for _ in range(times):
-            field.coefficients = self.reference.iterate(surfaces, source, field, lookups)
-        return field.coefficients
+    def project_emitters(self):
+        """(P, K, 3) what sampled emitters add to the field."""
+        before = self.project()
+        self.backend.find_emission(self.gpu)
+        return self.project() - before
