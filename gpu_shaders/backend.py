@@ -20,8 +20,9 @@ from ..core.grid import Grid
 from ..core.patches import gather_rays
 from ..core.scene_changes import SceneChanges
 from ..core.settings import BakeSettings
-from ..core.snapshot import SceneSnapshot
+from ..core.snapshot import SceneSnapshot, World
 from ..core.world_map import world_texels
+from ..core.world_suns import extract_suns
 from .patch_light import PatchLight
 from .programs import program
 from .raster_capture import RasterCapture
@@ -84,9 +85,16 @@ class GpuBackend:
         self._raster = None
 
     def _send_world(self, snapshot: SceneSnapshot) -> None:
+        """Probes see the world whole; to patches its suns are lamps and rays see the rest."""
+        rest, suns = extract_suns(snapshot.world)
+        self.scene.set_suns(suns)
+        self.world_texels = self._background(snapshot.world)
+        self.world_rest = self._background(rest) if suns else self.world_texels
+
+    def _background(self, world: World) -> gpu.types.GPUTexture:
         background = np.zeros((6 * self.face**2, 4), np.float32)
-        background[:, :3] = world_texels(snapshot.world, self.face).reshape(-1, 3)
-        self.world_texels = upload(background, "texels")
+        background[:, :3] = world_texels(world, self.face).reshape(-1, 3)
+        return upload(background, "texels")
 
     def update(self, snapshot: SceneSnapshot, changes: SceneChanges) -> str:
         """Brings the scene to ``snapshot``; texel surfaces and patches stay what they are. Returns what became of the
@@ -97,6 +105,7 @@ class GpuBackend:
             self.object_count = max(len(snapshot.object_names), 1)
         if changes.world:
             self._send_world(snapshot)
+            self.light.world_texels = self.world_rest
         return hierarchy
 
     # Probes
@@ -113,8 +122,8 @@ class GpuBackend:
 
     def allocate_field(self) -> None:
         """Field and statistics of the active probes, all zero."""
-        elements = len(self._nodes) * self.coefficients
-        self._field, self._emitted = (allocate(elements, "field coefficients") for _ in range(2))
+        self._field = allocate(len(self._nodes) * self.coefficients, "field coefficients")
+        self.forget_emission()
         self._moments = allocate(len(self._nodes) * DEPTH_EDGE**2, "depth statistics", "RG32F")
         self._shares = allocate(len(self._nodes), "probes")
 
@@ -230,7 +239,7 @@ class GpuBackend:
 
     def forget_patches(self) -> None:
         """Begins with no patch: all texels must be bound again."""
-        self.light = PatchLight(self.scene, self.grid, self.settings, self.world_texels)
+        self.light = PatchLight(self.scene, self.grid, self.settings, self.world_rest)
 
     def bind(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> None:
         """Finds the patches on which the texels of all or of ``count`` probes from ``start`` lie."""
@@ -293,8 +302,12 @@ class GpuBackend:
         shader.uniform_int("own_texels", (int(own_texels),))
         gpu.compute.dispatch(shader, count, 1, 1)
 
+    def forget_emission(self) -> None:
+        """No probe sees a sampled emitter."""
+        self._emitted = allocate(len(self._nodes) * self.coefficients, "field coefficients")
+
     def find_emission(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> None:
-        """What all or ``count`` probes from ``start`` see of sampled emitters, for ``project`` and ``gather`` to add."""
+        """What all or ``count`` probes from ``start`` see of sampled emitters; ``project`` and ``gather`` add it."""
         shader = program(
             "emission_project_comp",
             FACE=self.face,

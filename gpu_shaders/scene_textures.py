@@ -44,6 +44,7 @@ class SceneTextures:
         self._build(snapshot)
         self._send_surfaces(snapshot, emitter_density)
         self._send_images(snapshot)
+        self._suns = pack_lights([], self._origin)
         self.set_lights(snapshot.lights, self._origin)
 
     def update(self, snapshot: SceneSnapshot, changes: SceneChanges, emitter_density: np.ndarray) -> str:
@@ -66,9 +67,16 @@ class SceneTextures:
         return hierarchy
 
     def set_lights(self, lights: list[Light], origin: np.ndarray) -> None:
-        """Other lights for the same surfaces."""
-        self._textures["lights"] = upload(pack_lights(lights, origin), "lights")
+        """Other lamps for the same surfaces."""
         self.light_count = len(lights)
+        self._lights = pack_lights(lights, origin)
+        self._textures["lights"] = upload(np.concatenate([self._lights, self._suns]), "lights")
+
+    def set_suns(self, suns: list[Light]) -> None:
+        """Suns of the world, which light patches like lamps. They follow the lamps, so that pictures, which see the
+        world through the field, count lamps only."""
+        self._suns = pack_lights(suns, np.zeros(3))
+        self._textures["lights"] = upload(np.concatenate([self._lights, self._suns]), "lights")
 
     def _build(self, snapshot: SceneSnapshot) -> None:
         corners = (snapshot.triangle_positions - self._origin).astype(np.float32)
@@ -166,7 +174,7 @@ class SceneTextures:
         else:
             self.bind_rays(shader)
         self.bind(shader, "lights")
-        shader.uniform_int("light_count", (self.light_count,))
+        shader.uniform_int("light_count", (self.light_count + len(self._suns),))
 
     def bind_emitters(self, shader) -> None:
         self.bind(shader, "emitters")
