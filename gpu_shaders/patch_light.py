@@ -97,6 +97,11 @@ class PatchLight:
         self._lit = self.count
         self._light_together(self._lit_together[-1:])
 
+    @property
+    def source(self) -> np.ndarray:
+        """(N, 4) irradiance that bounces begin with: direct, and brought along by rays."""
+        return self._direct + self._brought_values
+
     def light_again(self) -> None:
         """Direct light of all patches for other lamps or emitters."""
         self._direct = self._direct[:0]
@@ -188,7 +193,8 @@ class PatchLight:
 
     def _carry(self, brought: list[np.ndarray], reflected: list[np.ndarray]) -> None:
         self._reflecting = reflected
-        self._brought = upload(np.concatenate(brought), "patches")
+        self._brought_values = np.concatenate(brought)
+        self._brought = upload(self._brought_values, "patches")
         self._reflected = upload(np.concatenate(reflected), "rays")
 
     def _trace_patches(self, start: int, stop: int) -> Iterator[_Rays]:

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where probes stand and which of them count: direct light tells shells from solids, probes in or behind walls move
+out, those that stay inside a solid are invalid."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core import relocation
+from ..core.conventions import INVALID
+from ..core.grid import Grid
+from ..core.orientation import ShellVote, inside_solid
+from ..gpu_shaders.backend import GpuBackend
+from .batches import Batches
+
+
+@dataclass
+class Placement:
+    """S slots of active probes."""
+
+    nodes: np.ndarray  # (S,) grid indices
+    home: np.ndarray  # (S, 3) world metres: the node, or where the user put the probe
+    by_hand: np.ndarray  # (S,) bool: the user put it there, and there it stays
+    step: np.ndarray  # (S, 3) metres from there to where it captures
+    shares: np.ndarray  # (S, 4) of the sphere, see GpuBackend.read_shares
+    misplaced: np.ndarray  # (S,) bool: worth moving, as seen from home
+    went_back: np.ndarray  # (S,) bool: was moved, saw no light there and went home
+
+    @classmethod
+    def at_home(cls, grid: Grid, nodes: np.ndarray, by_hand_m: np.ndarray) -> Placement:
+        """Nothing is known yet; ``by_hand_m`` (P, 3) are the user's own moves of all probes of the grid."""
+        count = len(nodes)
+        return cls(
+            nodes,
+            (grid.positions() + by_hand_m)[nodes],
+            by_hand_m[nodes].any(axis=1),
+            np.zeros((count, 3)),
+            np.zeros((count, 4)),
+            np.zeros(count, bool),
+            np.zeros(count, bool),
+        )
+
+    @property
+    def moved(self) -> np.ndarray:
+        """(S,) bool: stands elsewhere than at home."""
+        return self.step.any(axis=1)
+
+    @property
+    def is_outdated(self) -> bool:
+        """Do ``shares`` of other light ask to move probes that stand at home, or home those that moved?"""
+        candidates = relocation.misplaced(self.shares) & ~self.by_hand & (~self.misplaced | self.went_back)
+        return bool((candidates & ~self.moved).any() or (_in_the_dark(self.shares) & self.moved).any())
+
+    def states(self, state: np.ndarray) -> tuple[np.ndarray, bool]:
+        """(P,) ``state`` before capture with invalid probes marked; and whether all would be, in which case none is."""
+        inside = inside_solid(self.shares)
+        result = state.copy()
+        if not inside.all():
+            result[self.nodes[inside]] = INVALID
+        return result, bool(inside.all())
+
+
+def place(placement: Placement, batches: Batches, backend: GpuBackend, grid: Grid) -> Iterator[None]:
+    """Fills ``placement`` from texel surfaces captured at home and bound to patches: lights those and judges."""
+    with batches.stopwatch("light"):
+        backend.light.light_new_patches()
+    yield from judge(placement, batches, backend)
+    placement.misplaced = relocation.misplaced(placement.shares) & ~placement.by_hand
+    yield from _relocate(placement, batches, backend, grid)
+
+
+def judge(placement: Placement, batches: Batches, backend: GpuBackend) -> Iterator[None]:
+    """What probes see as a whole, by the direct light of their patches."""
+    vote = ShellVote(backend.object_count)
+    for index in range(batches.count):
+        vote.add(backend.sightings(batches.bound(index)))
+        yield
+    backend.set_shells(vote.shells())
+    for index in range(batches.count):
+        backend.statistics(batches.bound(index))
+        yield
+    placement.shares = backend.read_shares()
+
+
+def _relocate(placement: Placement, batches: Batches, backend: GpuBackend, grid: Grid) -> Iterator[None]:
+    """Moves probes that stand in or behind walls. One that sees no light from its new place either goes back."""
+    candidates = np.flatnonzero(placement.misplaced)
+    if not len(candidates):
+        return
+    step = placement.step
+    for index in range(batches.count):
+        slots = batches.slots_of(index, candidates)
+        if len(slots):
+            surfaces = batches.bound(index)
+            step[slots] = relocation.moves(grid, placement.home[slots], backend.exits(surfaces, slots - surfaces.first))
+        yield
+    moved = np.flatnonzero(placement.moved)
+    yield from _stand(placement, moved, batches, backend)
+    back = moved[_in_the_dark(placement.shares[moved])]
+    placement.went_back[back] = True
+    step[back] = 0.0
+    yield from _stand(placement, back, batches, backend)
+
+
+def _stand(placement: Placement, changed: np.ndarray, batches: Batches, backend: GpuBackend) -> Iterator[None]:
+    """Captures and judges probes ``changed`` (L,) where they stand now."""
+    backend.set_probes(placement.nodes, placement.home + placement.step)
+    batches.capture_again(changed)
+    yield
+    with batches.stopwatch("light"):
+        backend.light.light_new_patches()
+    for index in range(batches.count):
+        if len(batches.slots_of(index, changed)):
+            backend.statistics(batches.bound(index))
+        yield
+    placement.shares = backend.read_shares()
+
+
+def _in_the_dark(shares: np.ndarray) -> np.ndarray:
+    """(L,) bool of probes that a move did not help."""
+    return (shares[:, 2] == 0) | inside_solid(shares)

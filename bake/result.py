@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a bake or a relight tells: to whom on the way, and what it produced."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from dataclasses import field as default
+from typing import Protocol
+
+from ..core.field import Field
+from ..gpu_shaders.scene_textures import SceneTextures
+
+
+class Reporter(Protocol):
+    """Where a bake tells how far it is."""
+
+    def phase(self, name: str, total: int | None = None) -> None: ...
+
+    def advance(self, amount: int = 1) -> None: ...
+
+    def note(self, text: str) -> None: ...
+
+    def warn(self, text: str) -> None: ...
+
+
+@dataclass
+class Relit:
+    """What a relight did, in numbers; everything else was kept."""
+
+    changes: list[str] = default(default_factory=list)  # in plain words
+    probes: int = 0  # that capture
+    probes_captured: int = 0  # of them again; one that moved twice counts twice
+    patches: int = 0  # of surface
+    patches_lit: int = 0  # whose direct light was computed
+    lights_direct: int = 0  # lamps whose direct light was computed
+    patches_traced: int = 0  # whose rays to others were traced
+    hierarchy: str = "kept"  # kept | refit | rebuilt
+    warm_start: bool = False  # bounces went on from the light before
+    iterations: int = 0
+
+
+@dataclass
+class BakeResult:
+    """What a bake produced. ``seconds`` by phase; ``energy`` per iteration: mean luminance of the irradiance of patches
+    that probes see. ``relit`` only after a relight."""
+
+    field: Field | None = None
+    iterations: int = 0
+    converged: bool = False
+    energy: list[float] = default(default_factory=list)
+    change: list[float] = default(default_factory=list)
+    seconds: dict[str, float] = default(default_factory=dict)
+    counts: dict[str, int] = default(default_factory=dict)
+    capture: str = ""
+    scene: SceneTextures | None = None  # for pictures: the scene as it lies on the GPU
+    notes: list[str] = default(default_factory=list)
+    warnings: list[str] = default(default_factory=list)
+    relit: Relit | None = None

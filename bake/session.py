@@ -1,0 +1,348 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One volume's bake that stays on the GPU, and relights that run only what a change of the scene needs.
+
+    what changed                    what runs again
+    lights                          direct light of patches, bounces, projection
+    world, emission, reflectance    the same, and materials of texels and of ends of rays; no probe captures
+    shape                           the hierarchy where it changed, capture of probes that can see it; then everything
+                                    after capture
+
+A relight ends where a fresh bake of the changed scene would end, except that probes which were moved out of walls stay
+where they are when only light changes. Steps are generators that yield between pieces of GPU work.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ..core import culling, dilation
+from ..core.change_reach import RASTER_SPREAD, grown
+from ..core.conventions import ACTIVE, CULLED, INVALID
+from ..core.errors import InputError
+from ..core.field import Field
+from ..core.grid import Grid
+from ..core.probe_edits import ProbeEdits
+from ..core.scene_changes import SceneChanges, ShapeChange, compare
+from ..core.settings import BakeSettings
+from ..core.snapshot import SceneSnapshot
+from ..gpu_shaders.backend import GpuBackend
+from ..gpu_shaders.change_pass import probes_reached, resolve_again
+from .batches import Batches
+from .capture_choice import choose_capture
+from .convergence import Convergence
+from .deringing import dering_field
+from .placement import Placement, judge, place
+from .result import BakeResult, Relit, Reporter
+from .stopwatch import Stopwatch
+
+_SMALL_CHANGE = 0.5  # of the light that bounces begin with: above, the light before is no better start than the dark
+
+
+class BakeSession:
+    """``bake`` once, then ``relight`` as often as the scene changes; ``result`` is that of the last one. The bake fills
+    the one given.
+
+    ``edits``: probes that the user switched off or moved. Moved ones capture where they were put and are not relocated.
+    """
+
+    def __init__(
+        self,
+        snapshot: SceneSnapshot,
+        grid: Grid,
+        settings: BakeSettings,
+        reporter: Reporter,
+        edits: ProbeEdits | None = None,
+        result: BakeResult | None = None,
+    ):
+        self.snapshot = snapshot
+        self.grid = grid
+        self.settings = settings
+        self.result = result or BakeResult()
+        self._reporter = reporter
+        self._edits = edits or ProbeEdits.none(grid)
+        self._stopwatch = Stopwatch(self.result.seconds)
+
+    # The bake
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def bake(self) -> Iterator[None]:
+        """The whole bake in steps; fills ``result`` as it goes and completes it with the last step.
+
+        Raises:
+            InputError: the scene has no surface, or the grid does not fit the GPU.
+        """
+        result = self.result
+        _check(self.snapshot, result)
+        with self._stopwatch("cull"):
+            self._reporter.phase("cull")
+            self._state = self._cull()
+        yield
+        with self._stopwatch("setup"):
+            self._reporter.phase("upload")
+            self.backend = GpuBackend(self.snapshot, self.grid, self.settings)
+        yield
+        result.scene = self.backend.scene
+        result.capture, reason = choose_capture(self.settings, self.backend.scene.triangle_count)
+        result.notes.append(reason)
+        self._batches = Batches(self.backend, np.flatnonzero(self._state == ACTIVE), result.capture, self._stopwatch)
+        if not self._batches.resident:
+            result.notes.append(
+                f"texel surfaces of {len(self._batches.nodes)} probes exceed the memory budget of "
+                f"{self.settings.memory_mib} MiB: they are captured again whenever they are needed"
+            )
+        self._stand_at_home()
+        yield from self._light_from_texels()
+
+    def _cull(self) -> np.ndarray:
+        """(P,) uint8 states before capture: ACTIVE or CULLED."""
+        state = np.full(self.grid.count, ACTIVE, np.uint8)
+        if not self.settings.keep_all:
+            state[~culling.needed_nodes(self.grid, self.snapshot.triangle_positions)] = CULLED
+        state[self._edits.disabled] = CULLED
+        if not (state == ACTIVE).any():
+            raise InputError(
+                f"{self.grid.name}: every probe is switched off; bring some back with Reset in the Volume panel"
+            )
+        return state
+
+    def _stand_at_home(self) -> None:
+        """Puts the probes of all slots where they belong, with no light yet."""
+        self._placement = Placement.at_home(self.grid, self._batches.nodes, self._edits.offset)
+        self.backend.set_probes(self._batches.nodes, self._placement.home)
+        self.backend.allocate_field()
+
+    def _light_from_texels(self) -> Iterator[None]:
+        """Everything after capture, from nothing: patches, placement, bounces, field."""
+        result, batches = self.result, self._batches
+        self._reporter.phase("capture", len(batches.nodes))
+        for index in range(batches.count):
+            self._reporter.advance(batches.bound(index).count)
+            yield
+        yield from place(self._placement, batches, self.backend, self.grid)
+        moved = int(self._placement.moved.sum())
+        if moved:
+            result.notes.append(f"{moved} probes in or behind walls were moved out, at most half a cell")
+        self._reporter.phase("light")
+        with self._stopwatch("light"):
+            self.backend.light.connect()
+        result.notes.append(f"light bounces between {self.backend.light.count} patches of surface")
+        yield
+        yield from self._bounce(warm=False)
+        yield from self._show(emission=self.backend.scene.emitter_count > 0)
+        self._finish()
+
+    def _bounce(self, warm: bool) -> Iterator[None]:
+        """Iterates until the light has settled, from the dark or from the light before."""
+        convergence = Convergence(self.settings.bounces, self.settings.tolerance)
+        while not convergence.done:
+            with self._stopwatch("light"):
+                energy, change, overlap, luminance = self.backend.light.iterate(
+                    bounce=warm or convergence.iterations > 0
+                )
+                self.result.energy.append(luminance)
+                factor = convergence.add(energy, change, overlap)
+                self._reporter.advance(1)
+                if factor:
+                    self.backend.light.extrapolate(factor)
+            yield
+        self.result.iterations = convergence.iterations
+        self.result.converged = convergence.converged
+        self.result.change = convergence.changes
+        self.result.notes.append(convergence.reason)
+
+    def _show(self, emission: bool) -> Iterator[None]:
+        """The field of all probes by the light of patches, or by a gather; with ``emission``, also what they see of
+        sampled emitters."""
+        batches, backend = self._batches, self.backend
+        for index in range(batches.count) if emission else ():
+            with self._stopwatch("light"):
+                backend.find_emission(batches.bound(index))
+            yield
+        self._reporter.phase("gather" if self.settings.gather else "project", len(batches.nodes))
+        for index in range(batches.count):
+            surfaces = batches.bound(index)
+            with self._stopwatch("light"):
+                (backend.gather if self.settings.gather else backend.project)(surfaces)
+                self._reporter.advance(surfaces.count)
+            yield
+
+    def _finish(self) -> None:
+        """Reads the field back and completes it for probes without light of their own."""
+        result, placement, backend = self.result, self._placement, self.backend
+        state, all_inside = placement.states(self._state)
+        if all_inside:
+            result.warnings.append(
+                f"{self.grid.name}: every probe sees mostly back faces without light; they are baked all the same. "
+                "Flip the normals of what surrounds the volume, or move it out of solid geometry"
+            )
+        with self._stopwatch("light"):
+            field = result.field = Field.empty(self.grid, self.settings.bands)
+            nodes = placement.nodes
+            field.state[:] = state
+            field.validity[nodes] = 1.0 - placement.shares[:, 0]
+            field.offset[:] = self._edits.offset
+            field.offset[nodes] += placement.step
+            field.coefficients[nodes] = backend.read_field()
+            field.coefficients = dilation.fill(self.grid, field.coefficients, state == ACTIVE)
+            field.depth[nodes] = backend.read_depth()
+            if self.settings.deringing:
+                result.notes.append(dering_field(field))
+        result.counts = {"total": self.grid.count} | {
+            name: int((state == value).sum())
+            for name, value in (("active", ACTIVE), ("culled", CULLED), ("invalid", INVALID))
+        }
+        if not np.isfinite(field.coefficients).all():
+            raise InputError(
+                f"scene '{self.snapshot.name}' sends light that is not finite; look for lights or emission beyond 1e30"
+            )
+
+    # Relighting
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def relight(self, snapshot: SceneSnapshot) -> Iterator[None]:
+        """Brings the bake to ``snapshot``, another state of the scene, in steps; ``result`` is a new one, with
+        ``relit``. If the steps are not followed to their end the session must not be used any more.
+
+        Raises:
+            InputError: as ``bake`` does.
+        """
+        changes = compare(self.snapshot, snapshot)
+        last = self.result
+        relit = Relit(changes.describe(), len(self._batches.nodes), patches=self.backend.light.count)
+        if changes.nothing:
+            self.result = replace(last, seconds={}, notes=["nothing changed"], iterations=0, relit=relit)
+            return
+        self.result = BakeResult(scene=self.backend.scene, capture=last.capture, relit=relit)
+        self._stopwatch.seconds = self.result.seconds
+        _check(snapshot, self.result)
+        self.snapshot = snapshot
+        captures = self._batches.captures
+        had_emitters = self.backend.scene.emitter_count > 0
+        order = self.backend.scene.hierarchy.order
+        with self._stopwatch("setup"):
+            self._reporter.phase("upload")
+            relit.hierarchy = self.backend.update(snapshot, changes)
+        yield
+        if changes.shape:
+            yield from self._reshape(changes.shape, relit.hierarchy, order, had_emitters)
+        rebind = bool(changes.shape)
+        if changes.world or changes.emission or changes.reflectance:
+            rebind |= yield from self._resolve()
+        if not rebind:
+            rebind = not (yield from self._light_again(changes, had_emitters))
+        if rebind:
+            yield from self._light_anew()
+        relit.probes, relit.patches = len(self._batches.nodes), self.backend.light.count
+        relit.probes_captured = self._batches.captures - captures
+        relit.iterations = self.result.iterations
+
+    def _light_again(self, changes: SceneChanges, had_emitters: bool) -> Iterator[None]:
+        """Light for patches that stay; returns whether they could."""
+        light, relit = self.backend.light, self.result.relit
+        before = light.source
+        emitters = changes.emission and (had_emitters or self.backend.scene.emitter_count > 0)
+        if changes.any_light or changes.world or emitters:  # the world may hold suns
+            with self._stopwatch("light"):
+                light.light_again()
+            relit.patches_lit, relit.lights_direct = light.count, len(self.snapshot.lights)
+            yield
+        if changes.world or changes.emission or changes.reflectance:
+            with self._stopwatch("light"):
+                if not light.carry_again():
+                    return False
+            relit.patches_traced = light.count
+            yield
+        yield from judge(self._placement, self._batches, self.backend)
+        if self._placement.is_outdated:
+            return False
+        change = float(np.linalg.norm(light.source - before))
+        relit.warm_start = self.settings.bounces is None and change < _SMALL_CHANGE * float(
+            np.linalg.norm(light.source)
+        )
+        yield from self._bounce(relit.warm_start)
+        if emitters:
+            self.backend.forget_emission()
+        yield from self._show(emitters and self.backend.scene.emitter_count > 0)
+        self._finish()
+        return True
+
+    def _light_anew(self) -> Iterator[None]:
+        """Light from texel surfaces on; probes that had been moved capture at home first, where placement begins."""
+        relit = self.result.relit
+        moved = np.flatnonzero(self._placement.moved)
+        self._stand_at_home()
+        self._batches.unbind()
+        self._batches.capture_again(moved)
+        self.backend.forget_patches()
+        yield
+        yield from self._light_from_texels()
+        relit.patches_lit = relit.patches_traced = self.backend.light.count
+        relit.lights_direct = len(self.snapshot.lights)
+
+    def _resolve(self) -> Iterator[None]:
+        """Materials of texels anew; returns whether patches must be found anew."""
+        batches, rebind = self._batches, False
+        if not batches.resident:
+            batches.drop()
+            return True
+        for index in range(batches.count):
+            with self._stopwatch("capture"):
+                rebind |= resolve_again(self.backend, batches.captured(index))
+            yield
+        return rebind
+
+    def _reshape(self, shape: ShapeChange, hierarchy: str, old_order: np.ndarray, had_emitters: bool) -> Iterator[None]:
+        """Texel surfaces for triangles that changed: captured where the change can be seen, kept elsewhere."""
+        backend, batches, placement = self.backend, self._batches, self._placement
+        with self._stopwatch("cull"):
+            self._state = self._cull()
+        again = placement.moved
+        for index in range(batches.count) if batches.resident else ():
+            with self._stopwatch("capture"):
+                surfaces = batches.captured(index)
+                mine = slice(surfaces.first, surfaces.first + surfaces.count)
+                again[mine] |= self._reached(surfaces, shape)
+                if hierarchy == "rebuilt" or had_emitters or backend.scene.emitter_count:
+                    numbers = _new_numbers(shape, old_order, backend.scene.hierarchy.order)
+                    resolve_again(backend, surfaces, numbers if hierarchy == "rebuilt" else None)
+            yield
+        again = np.isin(np.flatnonzero(self._state == ACTIVE), placement.nodes[again])
+        with self._stopwatch("capture"):
+            missing = batches.regroup(np.flatnonzero(self._state == ACTIVE))
+            again[missing] = True
+            self._stand_at_home()
+        batches.capture_again(np.flatnonzero(again))
+        yield
+
+    def _reached(self, surfaces, shape: ShapeChange) -> np.ndarray:
+        """(count,) bool of the probes of ``surfaces`` that can see the change."""
+        spread = RASTER_SPREAD * 2.0 / self.settings.face if self.result.capture == "raster" else 0.0
+        positions = self._placement.home + self._placement.step - self.grid.center
+        old, new = (grown(boxes - self.grid.center, positions, spread) for boxes in (shape.old_boxes, shape.new_boxes))
+        return probes_reached(self.backend, surfaces, old, new)
+
+
+def _new_numbers(shape: ShapeChange, old_order: np.ndarray, new_order: np.ndarray) -> np.ndarray:
+    """(T,) number in the new leaf order of each triangle of the old one, −1 for those that are gone."""
+    before = np.arange(len(new_order)) if shape.triangle_map is None else shape.triangle_map
+    now = np.full(len(old_order), -1)
+    now[before[before >= 0]] = np.flatnonzero(before >= 0)
+    place = np.empty(len(new_order), int)
+    place[new_order] = np.arange(len(new_order))
+    return np.where(now[old_order] >= 0, place[now[old_order]], -1)
+
+
+def _check(snapshot: SceneSnapshot, result: BakeResult) -> None:
+    """Refuses scenes without surface, warns of those without light."""
+    if not len(snapshot.triangles):
+        raise InputError(f"scene '{snapshot.name}' has no surface that renders; add or unhide a mesh")
+    emits = any(max(m.emission) > 0 for m in snapshot.materials)
+    world = snapshot.world.map is not None or max(snapshot.world.color) > 0
+    if not (snapshot.lights or emits or world):
+        result.warnings.append(
+            f"scene '{snapshot.name}' has no light: no lamp, emission or world; the field is black. Add a light or "
+            "enable its rendering"
+        )
