@@ -17,11 +17,12 @@ from ..core.errors import GridlightError
 from ..core.field import Field
 from ..core.snapshot import SceneSnapshot
 from ..scene.notices import Notices
+from ..scene.probe_objects import read_edits
 from ..scene.read import read_lights, read_scene
 from ..scene.world import read_world
 from .changes import FIELDS, LIGHTS, SURFACES, WORLD
 from .gpu_scene import GpuScene
-from .live_bake import LiveBake
+from .live_bake import LiveBake, Target
 from .readout import Readout
 
 _PATIENCE = 3.0  # times the duration of a read: how long a scene must stand still before it is read again
@@ -92,8 +93,12 @@ class SceneSession:
         if self.gpu is None or not self.gpu.fields or self._pending:
             return
         if self._light_is_old and not self._live.is_waiting:
-            grids = [item.field.grid for item in self.gpu.fields.values()]
-            self._live.follow(self.snapshot, grids, scene.gridlight.bake_settings())
+            targets = [
+                Target(item.field.grid, read_edits(scene, scene.objects[name]))
+                for name, item in self.gpu.fields.items()
+                if name in scene.objects
+            ]
+            self._live.follow(self.snapshot, targets, scene.gridlight.bake_settings())
             self._light_is_old = False
         if not self._live.is_working:
             return
