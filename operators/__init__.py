@@ -14,7 +14,7 @@ def _modules() -> tuple:
 def register():
     import bpy
 
-    from . import bake, explore, preview, properties, stale
+    from . import bake, explore, kept_bakes, preview, properties, stale
 
     modules = _modules()
     classes = [item for module in modules for item in module.classes]
@@ -23,6 +23,8 @@ def register():
     _unregister.append(leave)
     properties.attach()
     _unregister.append(properties.detach)
+    kept_bakes.attach()
+    _unregister.append(kept_bakes.detach)
     stale.attach()
     _unregister.append(stale.detach)
     preview.attach()

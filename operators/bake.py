@@ -12,7 +12,7 @@ from bpy.props import BoolProperty
 from .. import viewport
 from ..core.errors import Cancelled, GridlightError
 from ..scene.field_storage import remove_field, stored_text
-from . import names, stale
+from . import kept_bakes, names, stale
 from .bake_task import BakeTask
 from .sidebar import redraw_sidebars
 from .volume_choice import chosen_volumes, in_object_mode, volumes_of
@@ -66,15 +66,11 @@ class _Job:
         redraw_sidebars()
 
 
-class GRIDLIGHT_OT_bake(bpy.types.Operator):
-    """Bake the light of the active volume, or of all volumes. Blender stays usable; Esc cancels and leaves everything
-    as it was"""
+class _BakesVolumes:
+    """What bakes and relights have in common; mix into an operator."""
 
-    bl_idname = names.BAKE
-    bl_label = "Bake"
     bl_options = {"UNDO"}
-
-    everything: BoolProperty(name="All Volumes", description="Bake every volume, not only the active one")
+    relights = False
 
     @classmethod
     def poll(cls, context):
@@ -88,12 +84,16 @@ class GRIDLIGHT_OT_bake(bpy.types.Operator):
             return False
         return True
 
+    def _task(self, context) -> BakeTask:
+        chosen = chosen_volumes(context, self.everything)
+        return BakeTask(context.scene, context.view_layer, chosen, self.relights)
+
     def execute(self, context):
         """Bakes to the end before it returns."""
         global _last_failure
         _last_failure = ""
         try:
-            task = BakeTask(context.scene, context.view_layer, chosen_volumes(context, self.everything))
+            task = self._task(context)
             for _ in task:
                 pass
         except GridlightError as error:
@@ -103,7 +103,7 @@ class GRIDLIGHT_OT_bake(bpy.types.Operator):
     def invoke(self, context, _event):
         global _running
         try:
-            task = BakeTask(context.scene, context.view_layer, chosen_volumes(context, self.everything))
+            task = self._task(context)
         except GridlightError as error:
             return self._failed(error)
         self._job = _running = _Job(task, context)
@@ -155,6 +155,36 @@ class GRIDLIGHT_OT_bake(bpy.types.Operator):
     def _failed(self, error: GridlightError) -> set[str]:
         self.report({"INFO"} if isinstance(error, Cancelled) else {"ERROR"}, str(error))
         return {"CANCELLED"}
+
+
+class GRIDLIGHT_OT_bake(_BakesVolumes, bpy.types.Operator):
+    """Bake the light of the active volume, or of all volumes. Blender stays usable; Esc cancels and leaves everything
+    as it was"""
+
+    bl_idname = names.BAKE
+    bl_label = "Bake"
+
+    everything: BoolProperty(name="All Volumes", description="Bake every volume, not only the active one")
+
+
+class GRIDLIGHT_OT_relight(_BakesVolumes, bpy.types.Operator):
+    """Follow what changed since the last bake without doing the rest again: lamps take a fraction of a bake, moved
+    objects only probes that see them"""
+
+    bl_idname = names.RELIGHT
+    bl_label = "Relight"
+    relights = True
+
+    everything: BoolProperty(name="All Volumes", description="Relight every volume, not only the active one")
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if not any(kept_bakes.is_kept(volume.session_uid) for volume in chosen_volumes(context)):
+            cls.poll_message_set("A relight goes on from a bake that is still on the GPU; bake first")
+            return False
+        return True
 
 
 class GRIDLIGHT_OT_cancel_bake(bpy.types.Operator):
@@ -225,4 +255,4 @@ def _interruptions() -> tuple[list, ...]:
     return handlers.load_pre, handlers.undo_pre, handlers.redo_pre
 
 
-classes = (GRIDLIGHT_OT_bake, GRIDLIGHT_OT_cancel_bake, GRIDLIGHT_OT_clear_bake)
+classes = (GRIDLIGHT_OT_bake, GRIDLIGHT_OT_relight, GRIDLIGHT_OT_cancel_bake, GRIDLIGHT_OT_clear_bake)

@@ -12,8 +12,10 @@ from collections.abc import Iterator
 
 import bpy
 
-from ..bake.job import BakeResult, bake_steps
+from ..bake.result import BakeResult
 from ..core.errors import Cancelled, InputError
+from ..core.grid import Grid
+from ..core.probe_edits import ProbeEdits
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..formats import probe_file
@@ -22,7 +24,9 @@ from ..gpu_shaders.context import device_description, ensure_context
 from ..scene.field_storage import store_field
 from ..scene.probe_objects import read_edits
 from ..scene.read import read_scene
+from . import kept_bakes
 from .bake_progress import Progress
+from .kept_bakes import KeptBake
 from .volume_choice import grid_of
 
 
@@ -32,7 +36,15 @@ class BakeTask:
     ``next`` raises what goes wrong: a GridlightError, after which the task is over.
     """
 
-    def __init__(self, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, volumes: list[bpy.types.Object]):
+    def __init__(
+        self,
+        scene: bpy.types.Scene,
+        view_layer: bpy.types.ViewLayer,
+        volumes: list[bpy.types.Object],
+        relight: bool = False,
+    ):
+        """``relight``: go on from bakes that were kept, where they fit; others are baked from nothing."""
+        self._relight = relight
         self.settings: BakeSettings = scene.gridlight.bake_settings()
         self.progress = Progress(len(volumes), self.settings)
         self.outcome = ""
@@ -89,15 +101,27 @@ class BakeTask:
         for warning in snapshot.warnings:
             self.progress.warn(warning)
         yield
-        results = []
-        for grid, edit in zip(grids, edits):
+        bakes = []
+        for uid, grid, edit in zip(self._volumes, grids, edits):
             self.progress.volume(grid.name)
-            result = BakeResult()
-            yield from bake_steps(snapshot, grid, self.settings, self.progress, result, edit)
-            results.append(result)
+            bakes.append((yield from self._bake(uid, snapshot, grid, edit)))
+        results = [bake.session.result for bake in bakes]
         self.outcome = _in_words(results, time.perf_counter() - started)
         for volume, result in zip(self._find_volumes(), results):
             self._store(volume, snapshot, result, shown)
+        kept_bakes.keep(dict(zip(self._volumes, bakes)))
+
+    def _bake(self, uid: int, snapshot: SceneSnapshot, grid: Grid, edits: ProbeEdits | None) -> Iterator[None]:
+        """One volume; returns its bake."""
+        kept = kept_bakes.take(uid)  # a bake from nothing wants the memory of the one before
+        if self._relight and kept is not None and kept.fits(grid, self.settings, edits):
+            kept.relay.target = self.progress
+            yield from kept.session.relight(snapshot)
+            return kept
+        del kept
+        fresh = KeptBake(grid, self.settings, edits, self.progress, snapshot)
+        yield from fresh.session.bake()
+        return fresh
 
     def _find_volumes(self) -> list[bpy.types.Object]:
         """The volumes as they are now; undo and renaming may have moved them.
@@ -135,8 +159,9 @@ def _by_uid(items, uid: int):
 
 def _in_words(results: list[BakeResult], seconds: float) -> str:
     active = sum(result.counts["active"] for result in results)
-    bounces = max(result.iterations for result in results) - 1
-    text = f"{active} probes baked in {seconds:.1f} s, light bounced {bounces} times"
+    bounces = max(max(result.iterations for result in results) - 1, 0)
+    done = "relit" if all(result.relit for result in results) else "baked"
+    text = f"{active} probes {done} in {seconds:.1f} s, light bounced {bounces} times"
     if not all(result.converged for result in results):
         text += ", some of it is still missing"
     return text

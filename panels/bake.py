@@ -40,6 +40,7 @@ class GRIDLIGHT_PT_bake(SidebarPanel, bpy.types.Panel):
         row.operator(names.BAKE, icon="RENDER_STILL")
         if len(volumes_of(context.scene)) > 1:
             row.operator(names.BAKE, text="Bake All").everything = True
+        row.operator(names.RELIGHT, icon="LIGHT")
         _state(layout, context)
 
 

@@ -236,3 +236,52 @@ def test_gallery_is_a_scene_of_its_own(scene):
     gallery = bpy.data.scenes["Gridlight Gallery"]
     groups = {item.gridlight_light.group for item in gallery.objects}
     assert groups == {"NONE", "CEILING_1", "CEILING_2", "WALL", "DYNAMIC"}
+
+
+def test_relight_ends_where_a_new_bake_does(room, gpu_context):
+    assert not bpy.ops.gridlight.relight.poll()
+    bpy.ops.gridlight.bake()
+    first = load_field(room).coefficients
+    bpy.data.objects["Point"].location.x = -0.7
+    assert bpy.ops.gridlight.relight() == {"FINISHED"}
+    relit = load_field(room).coefficients
+    bpy.ops.gridlight.bake()
+    anew = load_field(room).coefficients
+    scale = np.abs(anew).max()
+    assert np.abs(anew - first).max() > 0.05 * scale
+    assert np.abs(relit - anew).max() < 0.01 * scale
+
+
+def test_relight_with_other_settings_is_a_bake(room, gpu_context):
+    bpy.ops.gridlight.bake()
+    bpy.context.scene.gridlight.bands = 2
+    bpy.ops.gridlight.relight()
+    assert load_field(room).bands == 2
+
+
+def test_nothing_is_kept_with_another_file(room, gpu_context):
+    from gridlight.operators import kept_bakes
+
+    bpy.ops.gridlight.bake()
+    uid = room.session_uid
+    assert kept_bakes.is_kept(uid) and bpy.ops.gridlight.relight.poll()
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert not kept_bakes.is_kept(uid)
+
+
+def test_parented_and_turned_volumes_are_baked_where_they_stand(room, gpu_context):
+    scene = bpy.context.scene
+    parent = bpy.data.objects.new("Parent", None)
+    scene.collection.objects.link(parent)
+    parent.rotation_euler.z, parent.location = 0.4, (0.1, 0.0, 0.2)
+    room.parent = parent
+    room.scale = (0.6, 0.8, 0.5)
+    bpy.context.view_layer.update()
+    bpy.ops.gridlight.bake()
+    assert np.allclose(load_field(room).grid.matrix, np.array(room.matrix_world), atol=1e-6)
+    from gridlight.scene.field_storage import has_moved
+
+    assert not has_moved(room)
+    parent.rotation_euler.z = 0.5
+    bpy.context.view_layer.update()
+    assert has_moved(room)

@@ -18,7 +18,9 @@ import bpy
 import numpy as np
 
 EXTENSION = "bl_ext.user_default.gridlight"
-READING_SCALE = 4  # letters of the interface are 8 to 11 pixels high; text recognition wants about 40
+READING_SCALE = 3  # letters of the interface are 8 to 11 pixels high; text recognition wants about 30
+# Grey levels that become white and black for reading: of bright letters on anything, of dim ones on dark ground.
+LEVELS = ("45%,85%", "20%,75%")
 LOOKS = 6  # at the screen before a person gives up looking for something
 REACTION_SECONDS = 0.25  # between a click and what it shows
 
@@ -119,9 +121,9 @@ class Person:
         region = region or self.region()
         return Rectangle(region.x, self.window.height - region.y - region.height, region.width, region.height)
 
-    def read(self, rectangle: Rectangle) -> list[tuple[str, Rectangle]]:
+    def read(self, rectangle: Rectangle, levels: str = LEVELS[0]) -> list[tuple[str, Rectangle]]:
         """Words on the screen and where they stand, in reading order."""
-        enlarge = ["-colorspace", "gray", "-negate", "-resize", f"{100 * READING_SCALE}%", "-level", "20%,80%"]
+        enlarge = ["-colorspace", "gray", "-level", levels, "-negate", "-resize", f"{100 * READING_SCALE}%"]
         image = _pipe(["convert", "ppm:-", *enlarge, "png:-"], _grab(rectangle))
         reading = ["tesseract", "-", "-", "--psm", "11", "--dpi", "300", "tsv"]
         lines = _pipe(reading, image).decode().splitlines()[1:]
@@ -136,12 +138,13 @@ class Person:
     def find(self, text: str, rectangle: Rectangle) -> Rectangle | None:
         """Where the words of ``text`` stand in a row on the screen."""
         wanted = text.split()
-        words = self.read(rectangle)
-        for start in range(len(words) - len(wanted) + 1):
-            row = words[start : start + len(wanted)]
-            if all(_alike(word, seen) for word, (seen, _) in zip(wanted, row)):
-                first, last = row[0][1], row[-1][1]
-                return Rectangle(first.x, first.y, last.x + last.width - first.x, first.height)
+        for levels in LEVELS:
+            words = self.read(rectangle, levels)
+            for start in range(len(words) - len(wanted) + 1):
+                row = words[start : start + len(wanted)]
+                if all(_alike(word, seen) for word, (seen, _) in zip(wanted, row)):
+                    first, last = row[0][1], row[-1][1]
+                    return Rectangle(first.x, first.y, last.x + last.width - first.x, first.height)
         return None
 
     def below(self, text: str) -> Rectangle:

@@ -46,3 +46,4 @@ def test_from_installing_to_exporting_in_six_clicks(person):
     yield 0.5
     assert (folder / "probes.exr").stat().st_size > 10_000
     assert person.clicks <= MOST_CLICKS
+    scene.gridlight.preview.enabled = False

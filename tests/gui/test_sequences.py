@@ -33,6 +33,7 @@ class User:
         self.harmless = [
             self.start_bake,
             self.start_bake,
+            self.start_relight,
             self.cancel_bake,
             self.wait_for_bake,
             self.place,
@@ -93,6 +94,8 @@ class User:
         yield 0.2
         self.person.move(3, 3)
         yield 0.2
+        bpy.ops.wm.read_homefile(use_factory_startup=True)  # the last bake stays until then
+        yield 0.2
         gc.collect()
         left = [type(item).__name__ for item in gc.get_objects() if type(item).__name__ in HOLDS_GPU_MEMORY]
         assert not left, (self.said, left)
@@ -130,6 +133,12 @@ class User:
         with self.person.at_viewport():
             if bpy.ops.gridlight.bake.poll():
                 bpy.ops.gridlight.bake("INVOKE_DEFAULT", everything=self.random.random() < 0.5)
+        yield self.random.choice([0.0, 0.05, 0.2])
+
+    def start_relight(self):
+        with self.person.at_viewport():
+            if bpy.ops.gridlight.relight.poll():
+                bpy.ops.gridlight.relight("INVOKE_DEFAULT")
         yield self.random.choice([0.0, 0.05, 0.2])
 
     def cancel_bake(self):

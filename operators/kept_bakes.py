@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The last bake's sessions, which stay on the GPU so that a relight need not begin anew.
+
+They go with the next bake, with the file, and with the extension.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+
+from ..bake.result import Reporter
+from ..bake.session import BakeSession
+from ..core.grid import Grid
+from ..core.probe_edits import ProbeEdits
+from ..core.settings import BakeSettings
+
+
+class Relay:
+    """A ``bake.result.Reporter`` that passes on to another, which may be replaced: sessions outlive progress bars."""
+
+    def __init__(self, target: Reporter):
+        self.target = target
+
+    def phase(self, name: str, total: int | None = None) -> None:
+        self.target.phase(name, total)
+
+    def advance(self, amount: int = 1) -> None:
+        self.target.advance(amount)
+
+    def note(self, text: str) -> None:
+        self.target.note(text)
+
+    def warn(self, text: str) -> None:
+        self.target.warn(text)
+
+
+class KeptBake:
+    """A session with what must still hold for it to be relit."""
+
+    def __init__(self, grid: Grid, settings: BakeSettings, edits: ProbeEdits | None, reporter: Reporter, snapshot):
+        self.relay = Relay(reporter)
+        self.session = BakeSession(snapshot, grid, settings, self.relay, edits)
+        self._grid, self._settings, self._edits = grid, settings, edits or ProbeEdits.none(grid)
+
+    def fits(self, grid: Grid, settings: BakeSettings, edits: ProbeEdits | None) -> bool:
+        """Whether a relight gives what a bake of ``grid`` with these settings and edits would."""
+        edits = edits or ProbeEdits.none(grid)
+        return (
+            settings == self._settings
+            and tuple(grid.resolution) == tuple(self._grid.resolution)
+            and np.array_equal(grid.matrix, self._grid.matrix)
+            and np.array_equal(edits.disabled, self._edits.disabled)
+            and np.array_equal(edits.offset, self._edits.offset)
+        )
+
+
+_kept: dict[int, KeptBake] = {}  # by session_uid of the volume's object
+
+
+def keep(bakes: dict[int, KeptBake]) -> None:
+    """Keeps these instead of all others."""
+    _kept.clear()
+    _kept.update(bakes)
+
+
+def take(uid: int) -> KeptBake | None:
+    """Hands the volume's bake out for good: one that is not followed to its end must not be used again."""
+    return _kept.pop(uid, None)
+
+
+def is_kept(uid: int) -> bool:
+    return uid in _kept
+
+
+@persistent
+def _file_goes(*_arguments) -> None:
+    _kept.clear()
+
+
+def attach() -> None:
+    bpy.app.handlers.load_pre.append(_file_goes)
+
+
+def detach() -> None:
+    bpy.app.handlers.load_pre.remove(_file_goes)
+    _kept.clear()
