@@ -47,6 +47,8 @@ class PreviewPass:
         """
         shading = shading or Shading()
         field = self._field
+        if field and shading.mode == "ERROR":
+            field.find_error()
         shader = program(
             "preview_comp",
             FACE=BACKGROUND_FACE,

@@ -33,13 +33,14 @@ class FieldTextures:
         nodes[active, 3] = np.arange(len(active))
         moments = np.zeros((len(active) * DEPTH_EDGE**2, 4), np.float32)
         moments[:, :2] = field.depth[active].reshape(-1, 2)
-        marks = np.zeros((grid.count, 4), np.float32)
-        marks[:, 0], marks[:, 1], marks[:, 2] = field.validity, field.state, interpolation_error(field)
+        self._marks = np.zeros((grid.count, 4), np.float32)
+        self._marks[:, 0], self._marks[:, 1] = field.validity, field.state
+        self._error_is_known = False
         self._textures = {
             "field_in": upload(rows, "field coefficients"),
             "grid_nodes": upload(nodes, "grid nodes"),
             "depth_moments": upload(moments, "depth statistics"),
-            "node_marks": upload(marks, "grid nodes"),
+            "node_marks": upload(self._marks, "grid nodes"),
         }
         self._grid_info = gpu.types.GPUUniformBuf(gpu.types.Buffer("FLOAT", 20, lookup.grid_info(grid).reshape(-1)))
 
@@ -48,9 +49,12 @@ class FieldTextures:
         """What shaders that read a field are compiled with; without one, ``NO_FIELD``."""
         return {"HAS_FIELD": True, "BANDS": self.bands, "COEFFICIENTS": self.bands**2}
 
-    def show(self, coefficients: gpu.types.GPUTexture) -> None:
-        """Reads the light from ``coefficients`` from now on: P·bands² elements that something else keeps up to date."""
-        self._textures["field_in"] = coefficients
+    def find_error(self) -> None:
+        """Makes the heat map's errors known, which cost too much to find for fields that change in every frame."""
+        if not self._error_is_known:
+            self._marks[:, 2] = interpolation_error(self.field)
+            self._textures["node_marks"] = upload(self._marks, "grid nodes")
+            self._error_is_known = True
 
     def bind(self, shader) -> None:
         for name, texture in self._textures.items():

@@ -140,6 +140,9 @@ class ViewportPass:
             self._draw(picture, view, shading, probes, visible or self._all_visible, backdrop)
 
     def _draw(self, picture, view, shading, probes, visible, backdrop) -> None:
+        if shading.mode == "ERROR":
+            for field in self._fields:
+                field.find_error()
         local = view.relative_to(self._origin)
         self._sample = _Sample(view_block(local, picture.height, picture.jitter()), shading, picture.samples, visible)
         spheres = [self._spheres(field, local.camera.position, probes) for field in self._fields] if probes else []

@@ -8,12 +8,8 @@ _unregister = []
 
 
 def register():
-    import bpy
-
     from . import engine, handlers
 
-    if hasattr(bpy.types, "GRIDLIGHT_RE_engine"):  # a registration that was cut short
-        return
     engine.register()
     _unregister.append(engine.unregister)
     handlers.register()

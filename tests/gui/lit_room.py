@@ -62,9 +62,9 @@ def is_drawn(person):
 
 def drawn(person, seconds=40.0):
     """Waits until what the views show is finished."""
-    yield 0.4
+    yield 0.3  # settings made by scripts are noticed five times a second
     yield from person.wait_until(lambda: is_drawn(person), "a finished picture", seconds)
-    yield 0.3
+    yield 0.15
 
 
 def middle(person, region=None, share=0.5):
