@@ -259,6 +259,7 @@ class GpuBackend:
         shader = program("texel_hits_comp", FACE=self.face)
         hits = allocate(count * 6 * self.face**2, "texels")
         shader.uniform_sampler("probe_slots", self.probe_slots)
+        self.scene.bind(shader, "triangle_corners")
         for name in ("geometry", "albedo"):
             shader.uniform_sampler(name, surfaces.textures[name])
         shader.image("hits", hits)

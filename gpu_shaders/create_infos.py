@@ -57,7 +57,7 @@ def capture_trace_comp(info, defines):
     _image(info, 0, "hits", layered=True)
     _ints(info, "first_slot")
     info.local_group_size(8, 8, 1)
-    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *_surface_files(defines), "ray_lib", "capture_trace_comp"]}
+    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *_surface_files(defines), "offset_lib", "ray_lib", "capture_trace_comp"]}
 
 
 def capture_raster(info, defines):
@@ -139,7 +139,7 @@ def _light_files(defines: dict) -> list[str]:
     """What it takes to light a point: rays, lamps and sampled emitters."""
     surfaces = ["surface_lib"] if "HAS_EMITTERS" in defines or "HAS_ALPHA" in defines else []
     emitters = ["emitter_lib"] if "HAS_EMITTERS" in defines else []
-    return ["random_lib", *surfaces, "ray_lib", "direct_light_lib", *emitters]
+    return ["random_lib", *surfaces, "offset_lib", "ray_lib", "direct_light_lib", *emitters]
 
 
 def field_project_comp(info, defines):
@@ -155,12 +155,12 @@ def field_project_comp(info, defines):
 
 def texel_hits_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
-    slot = _samplers(info, "probe_slots")
+    slot = _samplers(info, "probe_slots", "triangle_corners")
     _samplers(info, "geometry", "albedo", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "hits")
     _ints(info, "first_slot", "first_layer")
     info.local_group_size(8, 8, 1)
-    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", "texel_hits_comp"]}
+    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", "offset_lib", "texel_hits_comp"]}
 
 
 def texel_patches_comp(info, defines):
@@ -178,7 +178,7 @@ def patch_visible_comp(info, defines):
     _ints(info, "pair_count")
     info.local_group_size(64, 1, 1)
     return {
-        "compute": ["data_lib", "octahedral_lib", *_surface_files(defines), "ray_lib", "patch_visible_comp"]
+        "compute": ["data_lib", "octahedral_lib", *_surface_files(defines), "offset_lib", "ray_lib", "patch_visible_comp"]
     }
 
 
@@ -220,7 +220,7 @@ def patch_rays_comp(info, defines):
             "data_lib",
             "octahedral_lib",
             "cubemap_lib",
-            *(_light_files(defines | {"HAS_ALPHA": True}) if is_path else ("random_lib", "surface_lib", "ray_lib")),
+            *(_light_files(defines | {"HAS_ALPHA": True}) if is_path else ("random_lib", "surface_lib", "offset_lib", "ray_lib")),
             "patch_rays_comp",
         ]
     }

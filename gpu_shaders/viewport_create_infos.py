@@ -31,7 +31,15 @@ def _field_files(defines: dict) -> list[str]:
 
 
 def _shading_files(defines: dict) -> list[str]:
-    return [*_field_files(defines), "random_lib", "surface_lib", "ray_lib", "direct_light_lib", "viewport_shade_lib"]
+    return [
+        *_field_files(defines),
+        "random_lib",
+        "surface_lib",
+        "offset_lib",
+        "ray_lib",
+        "direct_light_lib",
+        "viewport_shade_lib",
+    ]
 
 
 def preview_comp(info, defines):

@@ -36,7 +36,7 @@ void main()
     if (throughput == vec3(0.0)) {
       break;
     }
-    end = vec4(surface.position, pack_normal(octahedral_encode(surface.normal)));
+    end = vec4(pull_back(surface.position, direction, hit.distance), pack_normal(octahedral_encode(surface.normal)));
 #if SEGMENTS > 1
     if (segment < SEGMENTS - 1) {
       normal = surface.normal;

@@ -9,7 +9,6 @@
  */
 
 const float NO_HIT = 3.0e38;
-const float STEP = 3.8e-6; /* of a point's magnitude: how far secondary rays step off a surface */
 
 struct Ray {
   vec3 origin;
@@ -191,18 +190,4 @@ bool trace_any(vec3 origin, vec3 direction, float limit)
     }
     item = stack[--top];
   }
-}
-
-/* Steps off a surface before a secondary ray starts: the rounding error of a hit point grows with the coordinates and with the
- * distance of the ray that found it, so the step does too. `towards` points back to where that ray came from. */
-vec3 step_off(vec3 point, vec3 normal, vec3 towards, float distance)
-{
-  float magnitude = max(max(abs(point.x), abs(point.y)), max(abs(point.z), distance));
-  return point + (normal + towards) * (magnitude * STEP);
-}
-
-/* The same for a point of which nothing is known but where it lies: a ray found it from no farther than the scene's middle is twice. */
-vec3 leave_surface(vec3 point, vec3 normal)
-{
-  return step_off(point, normal, normal, 2.0 * length(point));
 }

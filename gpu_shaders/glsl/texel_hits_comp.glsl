@@ -4,6 +4,31 @@
  * layer first_layer + probe.
  */
 
+/* The point of a triangle nearest to `point`, which lies on its plane. Rasterised triangles reach a 256th of a texel over their edges:
+ * a point there may lie behind the next wall. */
+vec3 into_triangle(int triangle, vec3 point)
+{
+  vec3 a = element(triangle_corners, 3 * triangle).xyz;
+  vec3 ab = element(triangle_corners, 3 * triangle + 1).xyz - a;
+  vec3 ac = element(triangle_corners, 3 * triangle + 2).xyz - a;
+  vec3 normal = cross(ab, ac);
+  float squared = dot(normal, normal);
+  if (squared == 0.0) {
+    return point;
+  }
+  vec3 offset = point - a;
+  vec3 weights;
+  weights.y = dot(cross(offset, ac), normal) / squared;
+  weights.z = dot(cross(ab, offset), normal) / squared;
+  weights.x = 1.0 - weights.y - weights.z;
+  if (min(weights.x, min(weights.y, weights.z)) >= 0.0) {
+    return point;
+  }
+  weights = max(weights, vec3(0.0));
+  weights /= weights.x + weights.y + weights.z;
+  return a + ab * weights.y + ac * weights.z;
+}
+
 void main()
 {
   ivec3 id = ivec3(gl_GlobalInvocationID);
@@ -14,7 +39,9 @@ void main()
   vec4 seen = texelFetch(geometry, at, 0);
   vec4 hit = vec4(0.0, 0.0, 0.0, -1.0);
   if (seen.z < NO_SURFACE && texelFetch(albedo, at, 0).rgb != vec3(0.0)) {
-    hit.xyz = element(probe_slots, first_slot + id.z).xyz + texel_direction(id.xy) * abs(seen.z);
+    vec3 direction = texel_direction(id.xy);
+    vec3 point = element(probe_slots, first_slot + id.z).xyz + direction * abs(seen.z);
+    hit.xyz = pull_back(into_triangle(int(seen.w), point), direction, abs(seen.z));
     hit.w = pack_normal(seen.xy);
   }
   imageStore(hits, element_position((id.z * 6 * FACE + id.y) * FACE + id.x), hit);

@@ -91,7 +91,7 @@ class RayScene:
         found = run(
             "rays",
             count,
-            libraries=["data_lib", "ray_lib"],
+            libraries=["data_lib", "offset_lib", "ray_lib"],
             elements=2 * count,
             textures_2d=self.textures,
             defines=self.defines,
@@ -189,7 +189,7 @@ def test_direct_light(name):
     found = run(
         "lights",
         4000,
-        libraries=["data_lib", "random_lib", "ray_lib", "direct_light_lib"],
+        libraries=["data_lib", "random_lib", "offset_lib", "ray_lib", "direct_light_lib"],
         inputs={"points": points, "normals": normals, "places": places},
         textures_2d={**scene.textures, "lights": lamp},
         defines={**scene.defines, "light_count": 1},
