@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .conventions import ACTIVE, DEPTH_EDGE
+from .gradients import gradient_bands
 from .grid import Grid
 
 
@@ -17,7 +18,9 @@ class Field:
 
     ``offset`` is the displacement of the capture position from the node in metres. ``depth`` holds mean and mean
     square of the distance to the nearest surface in an octahedral map (row-major, DEPTH_EDGE² texels) in metres and
-    metres². ``metadata`` is the JSON part of the probe file.
+    metres². ``gradient`` is the change of the coefficients that irradiance needs, K of them, per metre along the
+    world's axes; zero where it is not given, and of probes without light of their own. ``metadata`` is the JSON part of
+    the probe file.
     """
 
     grid: Grid
@@ -27,6 +30,11 @@ class Field:
     offset: np.ndarray  # (P, 3) float32 metres
     depth: np.ndarray  # (P, DEPTH_EDGE², 2) float32
     metadata: dict = field(default_factory=dict)
+    gradient: np.ndarray | None = None  # (P, 3, K, 3) float32, K = min(bands, 3)²
+
+    def __post_init__(self):
+        if self.gradient is None:
+            self.gradient = np.zeros((self.grid.count, 3, gradient_bands(self.bands) ** 2, 3), np.float32)
 
     @property
     def bands(self) -> int:

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The field's lookup, readable and slow: what iterations, preview, ``eval`` and exporters agree on.
 
-Irradiance at a point is the trilinear blend of the eight probes around it, each weighted by whether it sees the point
-(Chebyshev's inequality on the depth moments of its octahedral map; Donnelly and Lauritzen, I3D 2006; Majercik et al.,
-JCGT 2019). There is no weight for the surface's orientation: it would bend the interpolation in open space, and a
-probe behind a wall is already found by its depth. Culled probes hang in free air, have no statistics and count as
-seen. Points outside the box are clamped to it. GLSL twin: lookup_lib.glsl and field_lib.glsl.
+Irradiance at a point is the trilinear blend of the eight probes around it, each led to the point by half of its
+gradient: two first-order expansions so blended reproduce the second order as well. Each is weighted by whether it sees
+the point (Chebyshev's inequality on the depth moments of its octahedral map; Donnelly and Lauritzen, I3D 2006; Majercik
+et al., JCGT 2019). There is no weight for the surface's orientation: it would bend the interpolation in open space, and
+a probe behind a wall is already found by its depth. Culled probes hang in free air, have no statistics and count as
+seen. Points outside the box are clamped to it, but gradients lead on for half a cell. GLSL twin: lookup_lib.glsl and
+field_lib.glsl.
 """
 
 from __future__ import annotations
@@ -16,11 +18,14 @@ from . import spherical_harmonics as sh
 from .conventions import ACTIVE, DEPTH_EDGE, INVALID
 from .cubemap import octahedral_encode
 from .field import Field
+from .gradients import per_cell
 from .grid import Grid
 
 LEAST_WEIGHT = 1e-4  # of an active probe that does not see the point: decides only where none does
 INVALID_WEIGHT = 1e-7  # of probes inside solids, which carry their neighbours' light
-_POINTS_AT_ONCE = 1 << 15
+BEYOND = 0.5  # cells past the box that gradients lead on
+_POINTS_AT_ONCE = 1 << 13
+_CORNERS = np.array([[corner & 1, corner >> 1 & 1, corner >> 2] for corner in range(8)])
 
 
 def depth_clamp(grid: Grid) -> float:
@@ -63,15 +68,29 @@ def lookup_weights(field: Field, points: np.ndarray, normals: np.ndarray) -> tup
 
 def trilinear(grid: Grid, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Nodes (N, 8) around ``points`` (N, 3), clamped to the box, and their plain weights (N, 8), which sum to 1."""
+    cell, blend, _beyond = _place(grid, points)
+    resolution = np.array(grid.resolution)
+    weights = np.where(_CORNERS, blend[:, None], 1 - blend[:, None]).prod(axis=2)
+    node = np.minimum(cell[:, None] + _CORNERS, resolution - 1)
+    return node[..., 0] + resolution[0] * (node[..., 1] + resolution[1] * node[..., 2]), weights
+
+
+def gradient_steps(grid: Grid, points: np.ndarray) -> np.ndarray:
+    """(N, 8, 3) cells along each axis for which gradients of the nodes around ``points`` (N, 3) are followed: half of
+    the way from the node to the point clamped to the box, and up to half a cell on from there."""
+    _cell, blend, beyond = _place(grid, points)
+    return 0.5 * (blend[:, None] - _CORNERS) + np.clip(beyond, -BEYOND, BEYOND)[:, None]
+
+
+def _place(grid: Grid, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """First corner (N, 3) of the cell of ``points`` (N, 3), where in the cell they are (N, 3) in 0..1, and how many
+    cells past the box (N, 3), signed."""
     resolution = np.array(grid.resolution)
     to_lattice = grid.world_to_lattice()
-    lattice = np.clip(points @ to_lattice[:, :3].T + to_lattice[:, 3], 0, resolution - 1)
-    cell = np.minimum(lattice.astype(int), np.maximum(resolution - 2, 0))
-    blend = lattice - cell
-    corners = np.array([[c & 1, c >> 1 & 1, c >> 2] for c in range(8)])
-    weights = np.where(corners[None], blend[:, None], 1 - blend[:, None]).prod(axis=2)
-    node = np.minimum(cell[:, None] + corners, resolution - 1)
-    return node[..., 0] + resolution[0] * (node[..., 1] + resolution[1] * node[..., 2]), weights
+    lattice = points @ to_lattice[:, :3].T + to_lattice[:, 3]
+    clamped = np.clip(lattice, 0, resolution - 1)
+    cell = np.minimum(clamped.astype(int), np.maximum(resolution - 2, 0))
+    return cell, clamped - cell, lattice - clamped
 
 
 def visibility(field: Field, nodes: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -92,10 +111,14 @@ def irradiance(field: Field, points: np.ndarray, normals: np.ndarray) -> np.ndar
     """(N, 3) irradiance at world ``points`` (N, 3) with unit ``normals`` (N, 3). Not clamped: may ring below zero."""
     points, normals = np.asarray(points, float), np.asarray(normals, float)
     result = np.empty((len(points), 3))
+    gradient = per_cell(field.grid, field.gradient)
     for start in range(0, len(points), _POINTS_AT_ONCE):
         part = slice(start, start + _POINTS_AT_ONCE)
         nodes, weights = lookup_weights(field, points[part], normals[part])
+        steps = gradient_steps(field.grid, points[part]) * weights[..., None]
         blended = np.einsum("nw,nwkc->nkc", weights, field.coefficients[nodes].astype(float))
+        led = np.einsum("nwa,nwakc->nkc", steps, gradient[nodes])
+        blended[:, : led.shape[1]] += led
         result[part] = sh.irradiance(blended, normals[part])
     return result
 

@@ -43,6 +43,33 @@ def basis(directions: np.ndarray, bands: int) -> np.ndarray:
     return np.stack(values, axis=-1)
 
 
+def basis_gradient(directions: np.ndarray, bands: int) -> np.ndarray:
+    """Gradients on the sphere of the first ``bands``² basis functions, up to three bands, at unit ``directions``
+    (…, 3); returns (…, bands², 3), vectors perpendicular to the direction.
+
+    Those of the polynomials less their part along the direction, which is l·Y for a homogeneous one (Euler).
+    """
+    directions = np.asarray(directions, float)
+    x, y, z = np.moveaxis(directions, -1, 0)
+    zero, one = np.zeros_like(x), np.ones_like(x)
+    values = [(zero, zero, zero)]
+    if bands > 1:
+        c1 = 0.4886025119029199
+        values += [(zero, c1 * one, zero), (zero, zero, c1 * one), (c1 * one, zero, zero)]
+    if bands > 2:
+        c2, c20, c22 = 1.0925484305920792, 0.31539156525252005, 0.5462742152960396
+        values += [
+            (c2 * y, c2 * x, zero),
+            (zero, c2 * z, c2 * y),
+            (-2 * c20 * x, -2 * c20 * y, 4 * c20 * z),
+            (c2 * z, zero, c2 * x),
+            (2 * c22 * x, -2 * c22 * y, zero),
+        ]
+    polynomial = np.stack([np.stack(value, axis=-1) for value in values], axis=-2)
+    degree = np.array([band_of(index) for index in range(bands * bands)])
+    return polynomial - (degree * basis(directions, bands))[..., None] * directions[..., None, :]
+
+
 def cosine_lobe(bands: int) -> np.ndarray:
     """(bands²,) factor A_l of every coefficient: radiance SH to irradiance SH."""
     return np.array([COSINE_LOBE[band_of(index)] for index in range(bands * bands)])
