@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which probes a change reaches: the shader against its twin."""
 
+from types import SimpleNamespace
+
 import gpu
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from gridlight.core import rays
 from gridlight.core.change_reach import grown, probes_that_see
 from gridlight.core.cubemap import texel_directions
 from gridlight.core.scene_changes import boxes_around
+from gridlight.gpu_shaders.backend import Surfaces
 from gridlight.gpu_shaders.change_pass import probes_reached
 from gridlight.gpu_shaders.textures import upload
 
@@ -44,7 +47,8 @@ def test_the_shader_reaches_what_the_twin_reaches(face):
         geometry[..., 2] = np.where(np.abs(geometry[..., 2]) >= NO_SURFACE, NO_SURFACE, geometry[..., 2])
         slots = np.zeros((53, 4))
         slots[3:, :3] = positions
-        found = probes_reached(layered(geometry), upload(slots, "probes"), 3, 50, face, old, new)
+        backend = SimpleNamespace(face=face, probe_slots=upload(slots, "probes"))
+        found = probes_reached(backend, Surfaces(3, 50, {"geometry": layered(geometry)}), old, new)
         agree.append(found == probes_that_see(positions, directions, distance, old, new))
         reached_share.append(found.mean())
     assert np.mean(agree) > 0.99  # the rest graze a box
@@ -53,5 +57,6 @@ def test_the_shader_reaches_what_the_twin_reaches(face):
 
 def test_no_box_reaches_nobody():
     none = np.empty((0, 2, 3))
-    geometry = layered(np.full((2, 24, 4, 4), 1.0))
-    assert not probes_reached(geometry, upload(np.zeros((2, 4)), "probes"), 0, 2, 4, none, none).any()
+    backend = SimpleNamespace(face=4, probe_slots=upload(np.zeros((2, 4)), "probes"))
+    surfaces = Surfaces(0, 2, {"geometry": layered(np.full((2, 24, 4, 4), 1.0))})
+    assert not probes_reached(backend, surfaces, none, none).any()

@@ -266,7 +266,7 @@ class User:
         yield 0.05
 
 
-HOLDS_GPU_MEMORY = {"GpuBackend", "SceneTextures", "Surfaces", "_Batches", "GpuScene", "SceneSession"}
+HOLDS_GPU_MEMORY = {"GpuBackend", "SceneTextures", "Surfaces", "Batches", "BakeSession", "GpuScene", "SceneSession"}
 
 
 def is_users(item):
