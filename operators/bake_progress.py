@@ -58,6 +58,11 @@ class Progress:
             self.warnings.append(text)
 
     @property
+    def phase_name(self) -> str:
+        """As ``phase`` was told it."""
+        return self._phase
+
+    @property
     def share(self) -> float:
         """0 … 1 of the whole work, as far as it can be known. Never goes back."""
         shares = {name: share for name, share in _SHARES.items() if name != self._unused}

@@ -48,6 +48,7 @@ class BakeTask:
         self.settings: BakeSettings = scene.gridlight.bake_settings()
         self.progress = Progress(len(volumes), self.settings)
         self.outcome = ""
+        self.longest_steps: dict[str, float] = {}  # seconds, by the phase in which the step began
         self._scene = scene.session_uid
         self._view_layer = view_layer.name
         self._volumes = [volume.session_uid for volume in volumes]
@@ -58,7 +59,12 @@ class BakeTask:
         if self._stop_reason:
             self.close()
             raise Cancelled(self._stop_reason)
-        next(self._steps)
+        phase, started = self.progress.phase_name, time.perf_counter()
+        try:
+            next(self._steps)
+        finally:
+            seconds = time.perf_counter() - started
+            self.longest_steps[phase] = max(self.longest_steps.get(phase, 0.0), seconds)
 
     def __iter__(self) -> BakeTask:
         return self
@@ -97,6 +103,7 @@ class BakeTask:
             probe_file.check_size(grid, self.settings.bands)
         view_layer = scene.view_layers.get(self._view_layer)
         snapshot = read_scene(scene, view_layer)
+        yield
         shown = scene_hash(read_scene(scene, view_layer, live=True))
         for warning in snapshot.warnings:
             self.progress.warn(warning)
@@ -145,6 +152,7 @@ class BakeTask:
             "outcome": self.outcome,
             "viewport_hash": viewport_hash,
             "seconds": result.seconds,
+            "longest_steps": self.longest_steps,
             "energy": [float(value) for value in result.energy],
             "change": [float(value) for value in result.change],
             "notes": result.notes,
