@@ -188,8 +188,10 @@ def _tick() -> float | None:
             session.shown_settings = settings
             _redraw_views(scene)
             busy = True
+    images.keep_only([area for area, _ in _views()])
+    drawable = {session.scene for session in sessions.existing() if session.gpu is not None}
     for area, scene in _views():
-        if images.needs_drawing(area):
+        if scene in drawable and images.needs_drawing(area):
             area.tag_redraw()
             busy = True
     return _FRAME_SECONDS if busy else _IDLE_SECONDS

@@ -49,6 +49,12 @@ class ViewImages:
     def clear(self) -> None:
         self._images.clear()
 
+    def keep_only(self, areas: list[bpy.types.Area]) -> None:
+        """Forgets regions that are not in ``areas`` any more: left quad views, closed windows."""
+        alive = {(area.as_pointer(), region.as_pointer()) for area in areas for region in area.regions}
+        for key in self._images.keys() - alive:
+            del self._images[key]
+
     def needs_drawing(self, area: bpy.types.Area) -> bool:
         """Does a picture in ``area`` want more samples?"""
         return any(

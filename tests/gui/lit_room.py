@@ -11,7 +11,7 @@ ALBEDO = (0.8, 0.5, 0.25)
 def build(person, radiance=RADIANCE, lamp=False):
     """A 6 m cube seen from inside, with a uniform field: every surface shows albedo × radiance of indirect light."""
     volumes = person.module("scene.volumes")
-    person.module("viewport.view_images").SAMPLES = 4  # enough for plain colours
+    person.module("viewport.view_images").SAMPLES = 2  # enough for plain colours
     bpy.context.scene.gridlight.preview.live = False  # the light shall stay as it is known
     cube = bpy.data.objects["Cube"]
     cube.scale = (3, 3, 3)
