@@ -32,6 +32,13 @@ def add_arguments(parser, in_blender: bool) -> None:
     volume.add_argument("--spacing", metavar="M", type=arguments.length, help="or the distance between probes, metres")
     add_settings(parser)
     parser.add_argument("--frame", metavar="N", type=int, help="frame to bake (default: the file's current one)")
+    parser.add_argument(
+        "--relight",
+        metavar="CHANGED.blend|N",
+        action="append",
+        default=[],
+        help="afterwards light another state of the scene, a file or a frame, computing only what changed; repeatable",
+    )
     parser.add_argument("--quiet", action="store_true", help="no progress; warnings stay")
 
 
@@ -129,8 +136,14 @@ def check(args) -> None:
             probe_file.check_size(grid, args.bands)
     elif args.resolution:
         Grid(np.eye(4), args.resolution)
-    if args.file is not None and not Path(args.file).exists():
-        raise InputError(f"{args.file}: no such file")
+    for file in [args.file, *(state for state in args.relight if not is_frame(state))]:
+        if file is not None and not Path(file).exists():
+            raise InputError(f"{file}: no such file")
+
+
+def is_frame(state: str) -> bool:
+    """Whether ``state``, a value of --relight, is a number of a frame and not a file."""
+    return state.removeprefix("-").isdigit() and not Path(state).exists()
 
 
 def run(args, reporter, should_stop):
@@ -140,6 +153,7 @@ def run(args, reporter, should_stop):
     from ..scene.probe_objects import edits_of
     from ..scene.read import read_scene
     from . import pipeline
+    from .relighting import relight_all
 
     check(args)
     settings = settings_from(args)
@@ -157,9 +171,18 @@ def run(args, reporter, should_stop):
             raise Cancelled("cancelled")
         pipeline.start_gpu(reporter, stopwatch)
         edits = [edits_of(scene, grid) for grid in grids]
-        results = pipeline.bake_volumes(snapshot, grids, settings, reporter, should_stop, stopwatch, edits)
+        kept = [] if args.relight else None
+        results = pipeline.bake_volumes(snapshot, grids, settings, reporter, should_stop, stopwatch, edits, kept)
         title = Path(args.file or bpy.data.filepath or scene.name).name
-        return pipeline.write_results(title, snapshot, settings, results, folder, reporter, should_stop, stopwatch)
+        summary, status = pipeline.write_results(
+            title, snapshot, settings, results, folder, reporter, should_stop, stopwatch
+        )
+        if args.relight:
+            summary["relight"], settled = relight_all(args, kept, folder, reporter, should_stop, stopwatch)
+            summary["files"] += [entry["file"] for entry in summary["relight"]]
+            summary["seconds"] = stopwatch.totals()
+            status = status if settled else pipeline.NOT_CONVERGED
+        return summary, status
 
 
 def choose_grids(args, snapshot) -> list[Grid]:

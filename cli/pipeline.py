@@ -9,8 +9,10 @@ from contextlib import contextmanager
 import bpy
 import numpy as np
 
-from ..bake.job import BakeResult, run_bake
+from ..bake.job import drive
 from ..bake.preview import write_previews
+from ..bake.result import BakeResult
+from ..bake.session import BakeSession
 from ..core.conventions import ACTIVE, CULLED, INVALID
 from ..core.errors import InputError
 from ..core.grid import Grid
@@ -77,27 +79,39 @@ def bake_volumes(
     should_stop,
     stopwatch: Stopwatch,
     edits: list[ProbeEdits | None] | None = None,
+    kept: list[BakeSession] | None = None,
 ) -> list[BakeResult]:
-    """Bakes ``grids`` one after the other, each with its ``edits``."""
+    """Bakes ``grids`` one after the other, each with its ``edits``. Appends the sessions to ``kept``, which keeps them
+    on the GPU."""
     for grid in grids:
         probe_file.check_size(grid, settings.bands)
     results = []
     for grid, edit in zip(grids, edits or [None] * len(grids)):
         if len(grids) > 1:
             reporter.note(f"volume '{grid.name}'")
-        result = run_bake(snapshot, grid, settings, reporter, should_stop, edit)
-        stopwatch.add(result.seconds)
-        for warning in result.warnings:
-            reporter.warn(warning)
-        for note in result.notes:
-            reporter.note(note)
-        if _unsettled(result, settings):
-            reporter.warn(
-                f"{grid.name}: the light has not settled after {result.iterations} iterations; the files are "
-                "written and marked. Raise --tolerance, or darken materials that reflect all light"
-            )
-        results.append(result)
+        session = BakeSession(snapshot, grid, settings, reporter, edit)
+        drive(session.bake(), should_stop)
+        stopwatch.add(session.result.seconds)
+        report_on(session.result, grid, settings, reporter)
+        results.append(session.result)
+        if kept is not None:
+            kept.append(session)
     return results
+
+
+def report_on(result: BakeResult, grid: Grid, settings: BakeSettings, reporter) -> bool:
+    """Passes on what a bake or relight had to say; returns whether its light settled where it should have."""
+    for warning in result.warnings:
+        reporter.warn(warning)
+    for note in result.notes:
+        reporter.note(note)
+    if _unsettled(result, settings):
+        reporter.warn(
+            f"{grid.name}: the light has not settled after {result.iterations} iterations; the files are "
+            "written and marked. Raise --tolerance, or darken materials that reflect all light"
+        )
+        return False
+    return True
 
 
 def write_results(
