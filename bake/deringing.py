@@ -3,14 +3,18 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..core.field import Field
-from ..core.ringing import dering
+from ..core.ringing import band_factors, dering
 
 
 def dering_field(field: Field) -> str:
     """Windows ``field`` where it rings; returns what to say about it."""
     window = dering(field.coefficients)
     field.coefficients = window.coefficients
+    factors = band_factors(window.factors, field.bands)[:, None, : field.gradient.shape[2], None]
+    field.gradient = (field.gradient * factors).astype(np.float32)
     done = window.as_dict()
     return (
         f"deringing: {done['windowed']} of {done['probes']} probes flattened, the strongest to "

@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core import culling, dilation
+from ..core import culling, dilation, gradients
 from ..core.change_reach import RASTER_SPREAD, grown
 from ..core.conventions import ACTIVE, CULLED, INVALID
 from ..core.errors import InputError
@@ -188,6 +188,9 @@ class BakeSession:
             field.coefficients[nodes] = backend.read_field()
             field.coefficients = dilation.fill(self.grid, field.coefficients, state == ACTIVE)
             field.depth[nodes] = backend.read_depth()
+            field.gradient[nodes] = backend.read_gradient()
+            field.gradient[state != ACTIVE] = 0.0
+            field.gradient = gradients.limited(self.grid, field.gradient, field.coefficients)
             if self.settings.deringing:
                 result.notes.append(dering_field(field))
         result.counts = {"total": self.grid.count} | {

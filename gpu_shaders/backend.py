@@ -23,6 +23,7 @@ from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot, World
 from ..core.world_map import world_texels
 from ..core.world_suns import extract_suns
+from .gradient_pass import GradientPass
 from .patch_light import PatchLight
 from .programs import program
 from .raster_capture import RasterCapture
@@ -73,6 +74,7 @@ class GpuBackend:
         weights = np.zeros((self.face * self.face, 4), np.float32)
         weights[:, 0] = texel_solid_angles(self.face).ravel()
         self._texel_weights = upload(weights, "texels")
+        self._gradient = GradientPass(settings.face, settings.bands, grid)
         self._send_world(snapshot)
         self.forget_patches()
         layer_limit = gpu.capabilities.max_texture_layers_get()
@@ -123,6 +125,7 @@ class GpuBackend:
     def allocate_field(self) -> None:
         """Field and statistics of the active probes, all zero."""
         self._field = allocate(len(self._nodes) * self.coefficients, "field coefficients")
+        self._gradient.allocate(len(self._nodes))
         self.forget_emission()
         self._moments = allocate(len(self._nodes) * DEPTH_EDGE**2, "depth statistics", "RG32F")
         self._shares = allocate(len(self._nodes), "probes")
@@ -302,9 +305,12 @@ class GpuBackend:
         shader.uniform_int("first_layer", (start,))
         shader.uniform_int("own_texels", (int(own_texels),))
         gpu.compute.dispatch(shader, count, 1, 1)
+        layers = (surfaces.first + start, start, count)
+        self._gradient.project(surfaces.textures, layers, self._texel_weights, irradiance, own_texels, _GROUP)
 
     def forget_emission(self) -> None:
         """No probe sees a sampled emitter."""
+        self._gradient.forget_emission()
         self._emitted = allocate(len(self._nodes) * self.coefficients, "field coefficients")
 
     def find_emission(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> None:
@@ -315,6 +321,7 @@ class GpuBackend:
             BANDS=self.settings.bands,
             COEFFICIENTS=self.coefficients,
             GROUP=_GROUP,
+            GRADIENT_COEFFICIENTS=self._gradient.coefficients,
             CANDIDATE_COUNT=PROBE_POINTS,
             **self.scene.light_defines,
         )
@@ -325,6 +332,8 @@ class GpuBackend:
         for name in ("geometry", "emission"):
             shader.uniform_sampler(name, surfaces.textures[name])
         shader.image("emitted", self._emitted)
+        shader.image("emitted_gradient", self._gradient.emitted)
+        shader.uniform_float("nearest", self._gradient.nearest)
         shader.uniform_int("first_slot", (surfaces.first + start,))
         shader.uniform_int("first_layer", (start,))
         shader.uniform_int("samples", (PROBE_RAYS,))
@@ -335,6 +344,10 @@ class GpuBackend:
         """(slots, coefficients, 3) float32 copy of the field."""
         values = read(self._field, len(self._nodes) * self.coefficients)
         return np.ascontiguousarray(values[:, :3].reshape(len(self._nodes), self.coefficients, 3))
+
+    def read_gradient(self) -> np.ndarray:
+        """(slots, 3, K, 3) float32 copy of the field's gradient per metre, not limited."""
+        return self._gradient.read()
 
     # Dispatch
     # ---------------------------------------------------------------------------------------------------------------

@@ -8,9 +8,12 @@ make up which stage, libraries first.
 from __future__ import annotations
 
 from ..core.conventions import DEPTH_EDGE
+from ..core.gradients import LEAST_COSINE
 from ..core.lookup import INVALID_WEIGHT, LEAST_WEIGHT
 
 NO_SURFACE = "1.0e30"
+# What shaders begin with that sum up a probe's texels.
+_PROBE_FILES = ("data_lib", "octahedral_lib", "cubemap_lib", "spherical_harmonics_lib", "group_sum_lib")
 
 
 def _samplers(info, *names: str, kind: str = "FLOAT_2D", first: int = 0) -> int:
@@ -57,7 +60,17 @@ def capture_trace_comp(info, defines):
     _image(info, 0, "hits", layered=True)
     _ints(info, "first_slot")
     info.local_group_size(8, 8, 1)
-    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *_surface_files(defines), "offset_lib", "ray_lib", "capture_trace_comp"]}
+    return {
+        "compute": [
+            "data_lib",
+            "octahedral_lib",
+            "cubemap_lib",
+            *_surface_files(defines),
+            "offset_lib",
+            "ray_lib",
+            "capture_trace_comp",
+        ]
+    }
 
 
 def capture_raster(info, defines):
@@ -142,15 +155,29 @@ def _light_files(defines: dict) -> list[str]:
     return ["random_lib", *surfaces, "offset_lib", "ray_lib", "direct_light_lib", *emitters]
 
 
+def _group_sums(info, defines: dict) -> None:
+    info.define("SUMS", "COEFFICIENTS")
+    info.local_group_size(int(defines["GROUP"]), 1, 1)
+
+
 def field_project_comp(info, defines):
     slot = _samplers(info, "texel_weights", "patch_irradiance", "emitted")
     _samplers(info, "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "field")
     _ints(info, "first_slot", "first_layer", "own_texels")
-    info.local_group_size(int(defines["GROUP"]), 1, 1)
-    return {
-        "compute": ["data_lib", "octahedral_lib", "cubemap_lib", "spherical_harmonics_lib", "texel_light_lib", "field_project_comp"]
-    }
+    _group_sums(info, defines)
+    return {"compute": [*_PROBE_FILES, "texel_light_lib", "field_project_comp"]}
+
+
+def field_gradient_comp(info, defines):
+    info.define("NO_SURFACE", NO_SURFACE)
+    slot = _samplers(info, "texel_edges", "texel_weights", "patch_irradiance", "emitted_gradient")
+    _samplers(info, "geometry", "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)
+    _image(info, 0, "field_gradient")
+    _ints(info, "first_slot", "first_layer", "own_texels")
+    info.push_constant("FLOAT", "nearest")
+    _group_sums(info, defines)
+    return {"compute": [*_PROBE_FILES, "texel_light_lib", "probe_emitter_lib", "field_gradient_comp"]}
 
 
 def texel_hits_comp(info, defines):
@@ -178,7 +205,14 @@ def patch_visible_comp(info, defines):
     _ints(info, "pair_count")
     info.local_group_size(64, 1, 1)
     return {
-        "compute": ["data_lib", "octahedral_lib", *_surface_files(defines), "offset_lib", "ray_lib", "patch_visible_comp"]
+        "compute": [
+            "data_lib",
+            "octahedral_lib",
+            *_surface_files(defines),
+            "offset_lib",
+            "ray_lib",
+            "patch_visible_comp",
+        ]
     }
 
 
@@ -220,7 +254,11 @@ def patch_rays_comp(info, defines):
             "data_lib",
             "octahedral_lib",
             "cubemap_lib",
-            *(_light_files(defines | {"HAS_ALPHA": True}) if is_path else ("random_lib", "surface_lib", "offset_lib", "ray_lib")),
+            *(
+                _light_files(defines | {"HAS_ALPHA": True})
+                if is_path
+                else ("random_lib", "surface_lib", "offset_lib", "ray_lib")
+            ),
             "patch_rays_comp",
         ]
     }
@@ -260,22 +298,22 @@ def patch_extrapolate_comp(info, defines):
 
 
 def emission_project_comp(info, defines):
+    info.define("LEAST_COSINE", repr(LEAST_COSINE))
     slot = _scene(info, defines)
     slot = _emitters(info, defines, slot)
     slot = _samplers(info, "lights", "probe_slots", "texel_weights", first=slot)
     _samplers(info, "geometry", "emission", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "emitted")
+    _image(info, 1, "emitted_gradient")
     _ints(info, "first_slot", "first_layer", "light_count", "samples", "seed")
-    info.local_group_size(int(defines["GROUP"]), 1, 1)
+    info.push_constant("FLOAT", "nearest")
+    _group_sums(info, defines)
     return {
         "compute": [
-            "data_lib",
-            "octahedral_lib",
-            "cubemap_lib",
-            "spherical_harmonics_lib",
+            *_PROBE_FILES,
+            "spherical_harmonics_gradient_lib",
+            "probe_emitter_lib",
             *_light_files(defines),
             "emission_project_comp",
         ]
     }
-
-

@@ -1,4 +1,5 @@
-/* What probes see of sampled emitters: the part of the field that no bounce and no lamp changes; field_project_comp adds it.
+/* What probes see of sampled emitters: the part of the field that no bounce and no lamp changes; field_project_comp adds it. For
+ * points on emitters also how that changes where the probe moves (core/gradients.py); field_gradient_comp adds it.
  *
  * Two ways, each where it is denser: texels, which carry emitters that fill many of them, and points on the emitters, which carry
  * those that fall between texel centres. Every place on an emitter belongs to one of the two. Texel centres are not random, so
@@ -9,22 +10,16 @@
  * Dispatch: one group of GROUP threads a probe; each takes a run of candidates; fixed order of summation.
  */
 
-SHARED_ vec4 partial_sums[COEFFICIENTS * GROUP];
 SHARED_ float run_weights[GROUP];
 SHARED_ float candidate_weights[CANDIDATE_COUNT];
 
 const int RUN = CANDIDATE_COUNT / GROUP;
 
-/* Candidate points on emitters per steradian, as a probe sees them. */
-float point_density(float density, float squared_distance, float cosine)
-{
-  return float(CANDIDATE_COUNT) * density * squared_distance / cosine;
-}
-
 struct Candidate {
   vec3 radiance; /* divided by its density: 0 where texels are denser */
   float weight;
   vec3 direction;
+  vec3 normal;
   float distance;
 };
 
@@ -38,6 +33,7 @@ Candidate candidate(vec3 origin, uvec3 key, int index)
   float squared = max(dot(offset, offset), 1.0e-20);
   result.distance = sqrt(squared);
   result.direction = offset / result.distance;
+  result.normal = emitter.normal;
   float density = point_density(emitter.density, squared, max(abs(dot(result.direction, emitter.normal)), 1.0e-4));
   ivec2 texel = direction_texel(result.direction);
   bool in_texels = density * element(texel_weights, (texel.y % FACE) * FACE + texel.x).x < 1.0;
@@ -53,23 +49,23 @@ void main()
   int layer = first_layer + probe;
   vec4 slot = element(probe_slots, first_slot + probe);
   vec3 sum[COEFFICIENTS];
+  vec3 gradient[3 * GRADIENT_COEFFICIENTS];
   float basis[COEFFICIENTS];
+  vec3 basis_gradient[GRADIENT_COEFFICIENTS];
   for (int c = 0; c < COEFFICIENTS; c++) {
     sum[c] = vec3(0.0);
   }
+  for (int i = 0; i < 3 * GRADIENT_COEFFICIENTS; i++) {
+    gradient[i] = vec3(0.0);
+  }
   for (int i = lane; i < 6 * FACE * FACE; i += GROUP) {
     ivec3 at = ivec3(i % FACE, i / FACE, layer);
-    vec4 emitted = texelFetch(emission, at, 0);
-    if (emitted.a > 0.0) {
-      vec4 seen = texelFetch(geometry, at, 0);
-      vec3 direction = texel_direction(at.xy);
-      float cosine = max(abs(dot(direction, octahedral_decode(seen.xy))), 1.0e-4);
-      float weight = element(texel_weights, (at.y % FACE) * FACE + at.x).x;
-      if (point_density(emitted.a, seen.z * seen.z, cosine) * weight < 1.0) {
-        sh_basis(direction, basis);
-        for (int c = 0; c < COEFFICIENTS; c++) {
-          sum[c] += emitted.rgb * (basis[c] * weight);
-        }
+    vec3 radiance = texel_emitter(at);
+    if (radiance != vec3(0.0)) {
+      sh_basis(texel_direction(at.xy), basis);
+      radiance *= element(texel_weights, (at.y % FACE) * FACE + at.x).x;
+      for (int c = 0; c < COEFFICIENTS; c++) {
+        sum[c] += radiance * basis[c];
       }
     }
   }
@@ -97,22 +93,40 @@ void main()
     }
     Candidate chosen = candidate(slot.xyz, key, lane * RUN + i);
     if (!trace_any(slot.xyz, chosen.direction, chosen.distance * 0.9999)) {
+      vec3 flux = chosen.radiance * (rays * step / chosen.weight);
       sh_basis(chosen.direction, basis);
       for (int c = 0; c < COEFFICIENTS; c++) {
-        sum[c] += chosen.radiance * (basis[c] * rays * step / chosen.weight);
+        sum[c] += flux * basis[c];
+      }
+      float cosine = dot(chosen.direction, chosen.normal);
+      vec3 turn = 3.0 * chosen.direction - chosen.normal / (max(abs(cosine), LEAST_COSINE) * (cosine < 0.0 ? -1.0 : 1.0));
+      flux /= max(chosen.distance, nearest);
+      sh_basis_gradient(chosen.direction, basis, basis_gradient);
+      for (int c = 0; c < GRADIENT_COEFFICIENTS; c++) {
+        vec3 change = basis[c] * turn - basis_gradient[c];
+        gradient[c] += flux * change.x;
+        gradient[GRADIENT_COEFFICIENTS + c] += flux * change.y;
+        gradient[2 * GRADIENT_COEFFICIENTS + c] += flux * change.z;
       }
     }
   }
+  int slot_index = first_slot + probe;
   for (int c = 0; c < COEFFICIENTS; c++) {
     partial_sums[c * GROUP + lane] = vec4(sum[c], 0.0);
   }
   barrier();
   for (int c = lane; c < COEFFICIENTS; c += GROUP) {
-    vec3 total = vec3(0.0);
-    for (int i = 0; i < GROUP; i++) {
-      total += partial_sums[c * GROUP + i].rgb;
+    imageStore(emitted, element_position(slot_index * COEFFICIENTS + c), vec4(group_sum(c), 0.0));
+  }
+  for (int axis = 0; axis < 3; axis++) {
+    barrier();
+    for (int c = 0; c < GRADIENT_COEFFICIENTS; c++) {
+      partial_sums[c * GROUP + lane] = vec4(gradient[axis * GRADIENT_COEFFICIENTS + c], 0.0);
     }
-    ivec2 target = element_position((first_slot + probe) * COEFFICIENTS + c);
-    imageStore(emitted, target, vec4(total, 0.0));
+    barrier();
+    for (int c = lane; c < GRADIENT_COEFFICIENTS; c += GROUP) {
+      ivec2 target = element_position((slot_index * 3 + axis) * GRADIENT_COEFFICIENTS + c);
+      imageStore(emitted_gradient, target, vec4(group_sum(c), 0.0));
+    }
   }
 }

@@ -2,11 +2,8 @@
  * `emitted`, what emission_project_comp found of sampled emitters.
  *
  * With own_texels the irradiance of texel i of the dispatch's probe p is element p · 6 · FACE² + i.
- * Dispatch: one group of GROUP threads a probe. Threads take texels in strides, then each coefficient is summed over the threads in
- * fixed order, so two runs give the same bytes. Reference: core/reference_bake.py.
+ * Dispatch: one group of GROUP threads a probe. Threads take texels in strides. Reference: core/reference_bake.py.
  */
-
-SHARED_ vec4 partial_sums[COEFFICIENTS * GROUP];
 
 void main()
 {
@@ -34,11 +31,7 @@ void main()
   }
   barrier();
   for (int c = lane; c < COEFFICIENTS; c += GROUP) {
-    vec3 total = vec3(0.0);
-    for (int i = 0; i < GROUP; i++) {
-      total += partial_sums[c * GROUP + i].rgb;
-    }
     int index = (first_slot + probe) * COEFFICIENTS + c;
-    imageStore(field, element_position(index), vec4(total + element(emitted, index).rgb, 0.0));
+    imageStore(field, element_position(index), vec4(group_sum(c) + element(emitted, index).rgb, 0.0));
   }
 }

@@ -1,0 +1,55 @@
+/* How the field of each probe changes where the probe moves: from the edges between texels, and `emitted_gradient`, which
+ * emission_project_comp found for points on sampled emitters. Formula, sources and reference: core/gradients.py.
+ *
+ * texel_edges, 2 elements an edge: tangent across it times its length, texel on one side | direction of its middle, texel beyond
+ * field_gradient, 3 · COEFFICIENTS elements a slot: axis by axis
+ * Dispatch: one group of GROUP threads a probe.
+ */
+
+/* Radiance that a texel sends, and one over its distance: 0 for background. */
+vec4 texel_seen(int texel, int probe)
+{
+  ivec3 at = ivec3(texel % FACE, texel / FACE, first_layer + probe);
+  vec4 emitted = texelFetch(emission, at, 0);
+  int own = own_texels != 0 ? probe * 6 * FACE * FACE + texel : -1;
+  vec3 radiance = texel_reflected(at, own) * 0.3183098861837907 + (emitted.a == 0.0 ? emitted.rgb : texel_emitter(at));
+  float distance = abs(texelFetch(geometry, at, 0).z);
+  return vec4(radiance, distance < NO_SURFACE ? 1.0 / max(distance, nearest) : 0.0);
+}
+
+void main()
+{
+  int probe = int(gl_WorkGroupID.x);
+  int lane = int(gl_LocalInvocationID.x);
+  int slot = first_slot + probe;
+  vec3 sum[3 * COEFFICIENTS];
+  for (int i = 0; i < 3 * COEFFICIENTS; i++) {
+    sum[i] = vec3(0.0);
+  }
+  for (int edge = lane; edge < 12 * FACE * FACE; edge += GROUP) {
+    vec4 across = element(texel_edges, 2 * edge);
+    vec4 middle = element(texel_edges, 2 * edge + 1);
+    vec4 first = texel_seen(int(across.w), probe);
+    vec4 second = texel_seen(int(middle.w), probe);
+    vec3 change = (second.rgb - first.rgb) * max(first.w, second.w);
+    float basis[COEFFICIENTS];
+    sh_basis(middle.xyz, basis);
+    for (int c = 0; c < COEFFICIENTS; c++) {
+      vec3 part = change * basis[c];
+      sum[c] += part * across.x;
+      sum[COEFFICIENTS + c] += part * across.y;
+      sum[2 * COEFFICIENTS + c] += part * across.z;
+    }
+  }
+  for (int axis = 0; axis < 3; axis++) {
+    barrier();
+    for (int c = 0; c < COEFFICIENTS; c++) {
+      partial_sums[c * GROUP + lane] = vec4(sum[axis * COEFFICIENTS + c], 0.0);
+    }
+    barrier();
+    for (int c = lane; c < COEFFICIENTS; c += GROUP) {
+      int index = (slot * 3 + axis) * COEFFICIENTS + c;
+      imageStore(field_gradient, element_position(index), vec4(group_sum(c) + element(emitted_gradient, index).rgb, 0.0));
+    }
+  }
+}
