@@ -62,12 +62,12 @@ PLACES = {
 
 @pytest.mark.parametrize("radius", [0.0, 0.05])
 @pytest.mark.parametrize("place", PLACES)
-def test_a_lamp_that_touches_something(place, radius):
+def test_a_lamp_that_touches_something(plain, place, radius):
     """Half or more of its light may end in the wall; never is there more than the free lamp gives."""
     lamp = replace(LAMP, matrix=frame(PLACES[place]), radius=radius)
     result = bake_room(lights=[lamp])
     check_whole(result)
-    assert light_at(result, points()).mean() < 1.3 * light_at(bake_room(), points()).mean()
+    assert light_at(result, points()).mean() < 1.3 * plain.mean()
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.05])
@@ -77,12 +77,12 @@ def test_a_lamp_inside_a_wall_lights_nothing(radius):
     assert light_at(result, points()).max() < 1e-6
 
 
-@pytest.mark.parametrize("distance", [0.3, 0.03, 0.01, 0.003])
+@pytest.mark.parametrize("distance", [0.3, 0.03, 0.003])
 def test_a_lamp_near_a_wall_gives_no_more_light_than_it_has(distance):
     """Near a wall half its light falls on a spot smaller than a texel, which one sample hits or misses."""
     law = mean_of_walls(4 * np.pi)
     random = np.random.default_rng(0)
-    for _ in range(8):
+    for _ in range(3):
         place = random.uniform(-0.7, 0.7, 3) * HALF
         axis = random.integers(3)
         place[axis] = random.choice([-1, 1]) * (HALF[axis] - distance)
@@ -91,11 +91,23 @@ def test_a_lamp_near_a_wall_gives_no_more_light_than_it_has(distance):
         assert mean < 1.5 * law, mean / law
 
 
-def test_thousands_of_lamps_are_one():
-    volume, settings = grid((2, 2, 1)), BakeSettings(face=4)
-    count = 2000
+@pytest.mark.parametrize("count", [600, pytest.param(5000, marks=pytest.mark.nightly)])
+def test_thousands_of_lamps_are_one(count):
+    """Some drivers end a shader's loops after so many rounds: none of the light may be lost to that."""
+    volume, settings = grid((2, 1, 1)), BakeSettings(face=4, bounces=0)
     one, many = (bake_room(volume, settings, lights=lamps) for lamps in ([LAMP], [times(LAMP, 1 / count)] * count))
     check_whole(many)
+    np.testing.assert_allclose(many.field.coefficients, one.field.coefficients, rtol=2e-3, atol=1e-4)
+
+
+def test_lamps_among_many_triangles():
+    """Fifty lamps in one place and forty thousand triangles: long loops in long loops."""
+    random = np.random.default_rng(0)
+    dust = random.uniform(-0.95, 0.95, (40_000, 1, 3)) * HALF + random.normal(0, 2e-3, (40_000, 3, 3))
+    volume, settings = grid((2, 1, 1)), BakeSettings(face=4, bounces=0)
+    one, many = (
+        bake_room(volume, settings, extra=[dust], lights=lamps) for lamps in ([LAMP], [times(LAMP, 1 / 50)] * 50)
+    )
     np.testing.assert_allclose(many.field.coefficients, one.field.coefficients, rtol=2e-3, atol=1e-4)
 
 

@@ -79,19 +79,23 @@ def test_boxes_without_volume_are_refused(axes):
 # --------------------------------------------------------------------------------------------------------------------
 
 
-def check_room(result, tolerance):
-    """Light in the middle of the room is that of a volume well inside it, to what another lattice may differ by."""
+@pytest.fixture(scope="module")
+def plain(gpu_context):
+    """Light in the middle of the room by a volume well inside it; another lattice may differ by a tenth."""
+    return light_at(bake_room(grid((5, 4, 4), 0.25)), points())
+
+
+def check_room(result, expected, tolerance):
     check_whole(result)
-    expected = light_at(bake_room(grid((5, 4, 4), 0.25)), points())
     found = light_at(result, points())
     assert difference(found, expected) < tolerance
     assert (found > -1e-3 * expected.max()).all()
 
 
-@pytest.mark.parametrize("inset", [0.0, 1e-7, -1e-7, 1e-3, -1e-3, 0.03, -0.03, -0.1])
-def test_probes_on_surfaces_edges_and_corners(inset):
+@pytest.mark.parametrize("inset", [0.0, 1e-7, -1e-7, 1e-3, -1e-3, -0.1])
+def test_probes_on_surfaces_edges_and_corners(plain, inset):
     """All outer nodes stand on a wall, an edge or a corner, a hair before or behind it, or in the wall."""
-    check_room(bake_room(grid((5, 4, 4), inset)), 0.15)
+    check_room(bake_room(grid((5, 4, 4), inset)), plain, 0.15)
 
 
 def test_probes_inside_a_solid_are_invalid_and_light_nothing():
@@ -120,13 +124,11 @@ def test_a_volume_outside_all_geometry_sees_the_world(keep_all):
     )
 
 
-def test_half_of_a_volume_outside_does_not_darken_the_room():
+def test_half_of_a_volume_outside_does_not_darken_the_room(plain):
     volume = Grid.from_bounds((-2 * HALF[0], -1.2, -1.0), (0.8 * HALF[0], 1.2, 1.0), (9, 4, 3))
     result = bake_room(volume)
-    inside = points()
-    inside = inside[np.abs(inside[:, 0]) < 1.4]
-    expected = light_at(bake_room(grid((5, 4, 4), 0.25)), inside)
-    assert difference(light_at(result, inside), expected) < 0.15
+    inside = np.abs(points()[:, 0]) < 1.4
+    assert difference(light_at(result, points()[inside]), plain[inside]) < 0.15
 
 
 def test_a_room_thinner_than_a_cell():
