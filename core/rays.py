@@ -123,6 +123,13 @@ def leave_surface(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return step_off(points, normals, normals, 2.0 * np.linalg.norm(points, axis=1))
 
 
+def pull_back(points: np.ndarray, directions: np.ndarray, distances: np.ndarray) -> np.ndarray:
+    """Hit ``points`` (N, 3) moved back a little along their rays, unit ``directions`` (N, 3), so that they do not lie
+    beyond the next wall where two meet."""
+    magnitude = np.maximum(np.abs(points).max(axis=1), distances)
+    return points - directions * (magnitude * _STEP)[:, None]
+
+
 def traverse(
     hierarchy: Hierarchy,
     triangles: np.ndarray,

@@ -30,6 +30,7 @@ from .field import Field
 from .grid import Grid
 from .orientation import ShellVote, inside_solid
 from .patches import gather_rays
+from .rays import pull_back
 from .reference_light import ReferenceLight
 from .reference_scene import ReferenceScene, Surfaces
 from .settings import BakeSettings
@@ -81,7 +82,8 @@ class ReferenceBake:
         hits = np.zeros((*surfaces.triangle.shape, 4), np.float32)
         reflects = (surfaces.triangle >= 0) & surfaces.albedo.any(axis=2)
         hits[..., 3] = -1.0
-        hits[reflects, :3] = self.points(surfaces)[reflects]
+        directions = np.broadcast_to(self.directions, self.points(surfaces).shape)[reflects]
+        hits[reflects, :3] = pull_back(self.points(surfaces)[reflects], directions, surfaces.distance[reflects])
         hits[reflects, 3] = pack_normal(octahedral_encode(surfaces.normal[reflects]))
         return hits
 

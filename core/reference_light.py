@@ -21,12 +21,13 @@ from .cubemap import direction_to_texel, octahedral_encode, pack_normal, unpack_
 from .emitters import sampling_density
 from .grid import Grid
 from .patches import MOST_ROUNDS, NO_PATCH, RAYS, SAMPLES, Patches, direct_samples, effort
-from .rays import leave_surface, step_off
+from .rays import leave_surface, pull_back, step_off
 from .reference_emitters import ReferenceEmitters
 from .reference_scene import ReferenceScene
 from .sampling import keys_of, light_keys, sample_cosine, sample_r2, shifted
 from .settings import BakeSettings
 from .world_map import world_texels
+from .world_suns import extract_suns
 
 _RAISE = 0.15  # of the distance between hit and leader: both ends of a line of sight are raised by it
 _RAY_STREAM, _PATH_LIGHT_STREAM = 0x85EBCA6B, 0x1B873593
@@ -57,7 +58,8 @@ class ReferenceLight:
         self.patches = Patches(grid)
         self.emitters = ReferenceEmitters(scene, sampling_density(scene.snapshot, grid))
         self.direct = np.zeros((0, 3))
-        self._world = world_texels(scene.snapshot.world, settings.face).reshape(-1, 3)
+        rest, self._suns = extract_suns(scene.snapshot.world)
+        self._world = world_texels(rest, settings.face).reshape(-1, 3)
         self._effort = 1
 
     # Which patch
@@ -136,10 +138,10 @@ class ReferenceLight:
         return irradiance
 
     def _lamps(self, point, origin, normal, keys, index, shadows: bool = True) -> np.ndarray:
-        """(C, 3) irradiance of all lamps by sample ``index`` of the sequences of ``keys`` (C, 3)."""
+        """(C, 3) irradiance of lamps and suns of the world by sample ``index`` of the sequences of ``keys`` (C, 3)."""
         total = np.zeros_like(point)
         visible = self.scene.visible if shadows else lambda origins, directions, limits: np.ones(len(origins), bool)
-        for number, light in enumerate(self.scene.snapshot.lights):
+        for number, light in enumerate([*self.scene.snapshot.lights, *self._suns]):
             u = sample_r2(light_keys(keys, number), index).astype(float)
             total += direct_light.irradiance(light, point + self.scene.origin, origin, normal, u, visible)
         return total
@@ -173,7 +175,7 @@ class ReferenceLight:
             carried[alive] += reflected[alive] * seen
             reflected[alive] *= surface.albedo  # zero where a ray missed
             position = origin[alive] + direction * np.where(missed, 0.0, found.distance)[:, None]
-            hits[alive, :3] = position
+            hits[alive, :3] = pull_back(position, direction, np.where(missed, 0.0, found.distance))
             hits[alive, 3] = _pack(surface.normal, ~missed)
             if segment < segments - 1:
                 on = reflected[alive].any(axis=1)
@@ -190,7 +192,8 @@ class ReferenceLight:
     def connect(self) -> None:
         """Traces rays between patches until they find no surface that is no patch yet."""
         rays_each = RAYS * self._effort
-        parts, ends = [], []
+        parts = [PatchRays(*(np.zeros((0, rays_each, size)) for size in (4, 3, 3)))]
+        ends = [np.zeros((0, rays_each), np.int64)]
         stop = 0
         for round_ in range(MOST_ROUNDS):
             start, stop = stop, self.patches.count
