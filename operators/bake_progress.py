@@ -86,11 +86,13 @@ class Progress:
 
     def __str__(self) -> str:
         text = _TITLES.get(self._phase, self._phase.capitalize())
+        if self._volumes > 1 and self.name:
+            text = f"{self.name}: {text}"
         if self._total:
             text += f" {min(self._done, self._total)}/{self._total}"
         elif self._done:
             text += f" {self._done}"
         left = self.seconds_left
         if left is not None:
-            text += f", about {left:.0f} s left" if left < 90 else f", about {left / 60:.0f} min left"
+            text += f", {left:.0f} s left" if left < 90 else f", {left / 60:.0f} min left"
         return text

@@ -30,17 +30,13 @@ class GRIDLIGHT_PT_bake(SidebarPanel, bpy.types.Panel):
             if quality
             else "Error not measured in advance"
         )
+        row = layout.row(align=True)
+        row.scale_y = 1.5
         task = running_task()
         if task is not None:
-            _running(layout, task)
-            return
-        column = layout.column(align=True)
-        column.scale_y = 1.5
-        row = column.row(align=True)
-        row.operator(names.BAKE, icon="RENDER_STILL")
-        if len(volumes_of(context.scene)) > 1:
-            row.operator(names.BAKE, text="Bake All").everything = True
-        row.operator(names.RELIGHT, icon="LIGHT")
+            _running(row, task)
+        else:
+            _buttons(row, context)
         _state(layout, context)
 
 
@@ -74,14 +70,18 @@ class GRIDLIGHT_PT_bake_settings(SidebarPanel, bpy.types.Panel):
         column.prop(settings, "deringing")
 
 
-def _running(layout, task) -> None:
-    progress = task.progress
-    if progress.name:
-        layout.label(text=progress.name, icon="LIGHTPROBE_VOLUME")
-    layout.progress(factor=progress.share, text=str(progress))
-    row = layout.row()
-    row.scale_y = 1.5
-    row.operator(names.CANCEL_BAKE, icon="CANCEL")
+def _buttons(row, context) -> None:
+    row.operator(names.BAKE, icon="RENDER_STILL")
+    if len(volumes_of(context.scene)) > 1:
+        row.operator(names.BAKE, text="Bake All").everything = True
+    row.operator(names.RELIGHT, icon="LIGHT")
+
+
+def _running(row, task) -> None:
+    """In place of the buttons, and as high as they are: nothing below moves."""
+    split = row.split(factor=0.75, align=True)
+    split.progress(factor=task.progress.share, text=str(task.progress))
+    split.operator(names.CANCEL_BAKE)
 
 
 def _state(layout, context) -> None:
