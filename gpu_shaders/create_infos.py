@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from ..core.conventions import DEPTH_EDGE
 from ..core.gradients import LEAST_COSINE
-from ..core.lookup import INVALID_WEIGHT, LEAST_WEIGHT
+from ..core.lookup import BEYOND, INVALID_WEIGHT, LEAST_WEIGHT
 
 NO_SURFACE = "1.0e30"
 # What shaders begin with that sum up a probe's texels.
@@ -46,6 +46,7 @@ def _lookup(info, first: int) -> int:
     info.define("DEPTH_EDGE", str(DEPTH_EDGE))
     info.define("LEAST_WEIGHT", repr(LEAST_WEIGHT))
     info.define("INVALID_WEIGHT", repr(INVALID_WEIGHT))
+    info.define("BEYOND", repr(BEYOND))
     info.uniform_buf(0, "vec4", "grid_info[5]")
     return _samplers(info, "grid_nodes", "depth_moments", first=first)
 
@@ -221,7 +222,8 @@ def patch_spread_comp(info, defines):
     slot = _emitters(info, defines, slot)
     _samplers(info, "lights", "patch_points", first=slot)
     _image(info, 0, "spread")
-    _ints(info, "first_patch", "patch_count", "light_count", "seed")
+    _ints(info, "first_patch", "patch_count", "first_light", "light_count", "seed")
+    info.define("FIRST_LIGHT", "first_light")
     info.local_group_size(64, 1, 1)
     return {"compute": ["data_lib", "octahedral_lib", *_light_files(defines), "patch_spread_comp"]}
 
@@ -231,7 +233,8 @@ def patch_direct_comp(info, defines):
     slot = _emitters(info, defines, slot)
     _samplers(info, "lights", "patches", "patch_points", first=slot)
     _image(info, 0, "direct")
-    _ints(info, "patch_count", "first_key", "light_count", "samples", "seed")
+    _ints(info, "patch_count", "first_key", "first_light", "light_count", "samples", "seed")
+    info.define("FIRST_LIGHT", "first_light")
     info.local_group_size(64, 1, 1)
     return {"compute": ["data_lib", "octahedral_lib", *_light_files(defines), "patch_direct_comp"]}
 

@@ -22,7 +22,7 @@ def _field(info, defines: dict, first: int) -> int:
     if "HAS_FIELD" not in defines:
         return first
     slot = _lookup(info, first)
-    return _samplers(info, "field_in", "node_marks", first=slot)
+    return _samplers(info, "field_in", "gradient_in", "node_marks", first=slot)
 
 
 def _field_files(defines: dict) -> list[str]:

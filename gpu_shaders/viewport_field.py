@@ -10,6 +10,7 @@ from ..core import lookup
 from ..core.conventions import ACTIVE, CULLED, DEPTH_EDGE
 from ..core.error_estimate import interpolation_error
 from ..core.field import Field
+from ..core.gradients import per_cell
 from .textures import upload
 
 
@@ -25,6 +26,9 @@ class FieldTextures:
         self.bands = field.bands
         rows = np.zeros((*field.coefficients.shape[:2], 4), np.float32)
         rows[..., :3] = field.coefficients
+        gradient = per_cell(grid, field.gradient)
+        steps = np.zeros((*gradient.shape[:3], 4), np.float32)
+        steps[..., :3] = gradient
         self.positions = grid.positions() + field.offset - grid.center
         active = np.flatnonzero(field.state == ACTIVE)
         nodes = np.full((grid.count, 4), -2.0, np.float32)
@@ -38,6 +42,7 @@ class FieldTextures:
         self._error_is_known = False
         self._textures = {
             "field_in": upload(rows, "field coefficients"),
+            "gradient_in": upload(steps, "field gradients"),
             "grid_nodes": upload(nodes, "grid nodes"),
             "depth_moments": upload(moments, "depth statistics"),
             "node_marks": upload(self._marks, "grid nodes"),

@@ -58,15 +58,30 @@ float visibility(int slot, vec3 probe, vec3 point)
   return chance * chance * chance;
 }
 
-/* First corner of the cell around `point` and the weights of its eight corners (x fastest), which sum to 1. */
-ivec3 lookup_cell(vec3 point, vec3 normal, out float weights[8])
+/* `point` in node numbers, clamped to the box; `beyond`: cells past it. */
+vec3 lattice_position(vec3 point, out vec3 beyond)
 {
-  ivec3 resolution = ivec3(grid_info[3].xyz);
   vec4 homogeneous = vec4(point, 1.0);
   vec3 lattice = vec3(dot(grid_info[0], homogeneous), dot(grid_info[1], homogeneous), dot(grid_info[2], homogeneous));
-  lattice = clamp(lattice, vec3(0.0), vec3(resolution - 1));
-  ivec3 cell = min(ivec3(lattice), max(resolution - 2, ivec3(0)));
+  vec3 clamped = clamp(lattice, vec3(0.0), grid_info[3].xyz - 1.0);
+  beyond = lattice - clamped;
+  return clamped;
+}
+
+ivec3 first_corner(vec3 lattice)
+{
+  return min(ivec3(lattice), max(ivec3(grid_info[3].xyz) - 2, ivec3(0)));
+}
+
+/* First corner of the cell around `point` and the weights of its eight corners (x fastest), which sum to 1. `lead`: cells for which
+ * the gradient of the first corner is followed; half a step less for every step to another corner. */
+ivec3 lookup_cell(vec3 point, vec3 normal, out float weights[8], out vec3 lead)
+{
+  vec3 beyond;
+  vec3 lattice = lattice_position(point, beyond);
+  ivec3 cell = first_corner(lattice);
   vec3 blend = lattice - vec3(cell);
+  lead = 0.5 * blend + clamp(beyond, -BEYOND, BEYOND);
   vec3 seen_point = point + normal * grid_info[4].x;
   float sum = 0.0;
   for (int corner = 0; corner < 8; corner++) {

@@ -26,20 +26,19 @@ vec3 lamps_radiance(Surface surface, vec3 direction, vec3 origin, uvec3 key, int
 vec3 field_irradiance_at(vec3 point, vec3 normal)
 {
   float weights[8];
-  int first_node = node_index(lookup_cell(point - shade_info[0].xyz, normal, weights));
+  vec3 lead;
+  int first_node = node_index(lookup_cell(point - shade_info[0].xyz, normal, weights, lead));
   return max(field_irradiance(first_node, vec4(weights[0], weights[1], weights[2], weights[3]),
-                              vec4(weights[4], weights[5], weights[6], weights[7]), normal),
+                              vec4(weights[4], weights[5], weights[6], weights[7]), lead, normal),
              vec3(0.0));
 }
 
 /* Validity blended as the grid lies in space, or the cell's error. */
 vec3 data_color(vec3 point)
 {
-  ivec3 resolution = ivec3(grid_info[3].xyz);
-  vec4 homogeneous = vec4(point - shade_info[0].xyz, 1.0);
-  vec3 lattice = vec3(dot(grid_info[0], homogeneous), dot(grid_info[1], homogeneous), dot(grid_info[2], homogeneous));
-  lattice = clamp(lattice, vec3(0.0), vec3(resolution - 1));
-  ivec3 cell = min(ivec3(lattice), max(resolution - 2, ivec3(0)));
+  vec3 beyond;
+  vec3 lattice = lattice_position(point - shade_info[0].xyz, beyond);
+  ivec3 cell = first_corner(lattice);
   if (shade_mode() == ERROR) {
     return heat_color(element(node_marks, node_index(cell)).z / FULL_SCALE_ERROR);
   }
