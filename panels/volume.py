@@ -54,7 +54,7 @@ class GRIDLIGHT_PT_probes(SidebarPanel, bpy.types.Panel):
         layout = self.layout
         volume = active_volume(context)
         if volume is not None:
-            _counts(layout, volume)
+            _counts(layout, context.scene, volume)
             _placed(layout, context, volume)
         row = layout.row(align=True)
         row.operator(names.PLACE_PROBES, text="Place", icon="EMPTY_AXIS")
@@ -83,12 +83,16 @@ def _grid(layout, volume) -> None:
         row.operator(names.FIT_VOLUME, text=title).fit = fit
 
 
-def _counts(layout, volume) -> None:
+def _counts(layout, scene, volume) -> None:
+    """From the bake; before it, as far as placing tells."""
     total = int(np.prod(resolution_of(volume)))
     counts = stored_counts(volume)
+    placed = probe_objects.placed_count(scene, volume)
     grid = layout.grid_flow(row_major=True, columns=4, even_columns=True, align=True)
     if counts is None or has_moved(volume):
         known = {"total": f"{total}", "active": "–", "culled": "–", "invalid": "–"}
+        if placed is not None and not probe_objects.stand_elsewhere(scene, volume):
+            known |= {"active": f"{placed}", "culled": f"{total - placed}"}
     else:
         known = {name: f"{count}" for name, count in counts.items()}
     for name in known:
@@ -104,6 +108,9 @@ def _placed(layout, context, volume) -> None:
     scene = context.scene
     placed = probe_objects.placed_count(scene, volume)
     if placed is None:
+        return
+    if probe_objects.stand_elsewhere(scene, volume):
+        paragraph(layout, context, "The probes stand where the volume was. Place them again", "ERROR")
         return
     if placed > probe_objects.OBJECT_LIMIT:
         text = f"{placed} probes are shown as points: more than {probe_objects.OBJECT_LIMIT} objects would be slow"

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from mathutils import Matrix, Vector
 
 from ..core.conventions import ACTIVE, CULLED
 from ..core.grid import Grid
@@ -39,8 +38,9 @@ def place_probes(
 
     Probes that this volume has in the scene already are replaced. ``state`` (P,) holds the states of
     ``core.conventions``; culled and invalid probes get no object, nor do those that ``edits`` disables. The volume is
-    known by the name of ``volume_object``, or by that of ``grid`` where it has no object; with an object the probes are
-    its children, and a later ``read_edits`` tells what was done to them.
+    known by the name of ``volume_object``, or by that of ``grid`` where it has no object; with an object a later
+    ``read_edits`` tells what was done to them. Probes are nobody's children: hundreds of dashed lines to their volume
+    would hide the scene. When the volume moves, they stay until they are placed again, and edits move with the volume.
     """
     volume = volume_object.name if volume_object else grid.name
     before, _ = _record_of(_find(scene, ""), volume_object)
@@ -58,14 +58,10 @@ def place_probes(
     digits = len(str(grid.count - 1))
     size = _DISPLAY_SHARE * float(grid.cell_size().min())
     positions = grid.positions() + edits.offset
-    to_parent = Matrix(np.linalg.inv(_transform(volume_object)).tolist()) if volume_object else None
     for index in np.flatnonzero(active & ~edits.disabled).tolist():
         probe = bpy.data.objects.new(f"{stem} {index:0{digits}d}", None)
         probe.empty_display_type = "SPHERE"
         probe.empty_display_size = size
-        if volume_object is not None:
-            probe.parent = volume_object
-            probe.matrix_parent_inverse = to_parent  # the location stays the world's until the volume is moved
         probe.location = positions[index]
         probe[VOLUME_PROPERTY] = volume
         probe[INDEX_PROPERTY] = index
@@ -87,15 +83,17 @@ def read_edits(scene: bpy.types.Scene, volume_object: bpy.types.Object) -> Probe
     if placed.sum() > OBJECT_LIMIT:
         return None
     grid = Grid(box_of(volume_object), resolution_of(volume_object), volume_object.name)
-    nodes = grid.positions()
+    placed_grid = Grid(_placed_box(record), grid.resolution, volume_object.name)
+    nodes = placed_grid.positions()
     offset = np.zeros((grid.count, 3))
     found = np.zeros(grid.count, bool)
     for probe in root.all_objects:
         if probe.get(VOLUME_PROPERTY) == volume and 0 <= probe.get(INDEX_PROPERTY, -1) < grid.count:
             index = probe[INDEX_PROPERTY]
             found[index] = True
-            offset[index] = _place_of(probe, volume_object) - nodes[index]
-    offset[np.abs(offset).max(axis=1) < _MOVED * grid.cell_size().min()] = 0.0
+            offset[index] = _place_of(probe) - nodes[index]
+    offset[np.abs(offset).max(axis=1) < _MOVED * placed_grid.cell_size().min()] = 0.0
+    offset = offset @ np.linalg.inv(placed_grid.matrix[:3, :3]).T @ grid.matrix[:3, :3].T  # with the volume
     edits = ProbeEdits(placed & ~found, bounded(grid, offset))
     return edits if edits.any else None
 
@@ -123,17 +121,15 @@ def reset(scene: bpy.types.Scene, volume_object: bpy.types.Object, only: set[bpy
         state = np.where(np.frombuffer(record["active"], np.uint8), ACTIVE, CULLED)
         place_probes(scene, grid, state, volume_object)
         return int((edits.disabled | edits.offset.any(axis=1)).sum())
-    nodes = grid.positions()
+    nodes = Grid(_placed_box(record), grid.resolution, volume_object.name).positions()
     moved = {
         probe[INDEX_PROPERTY]: probe
         for probe in only
         if probe.get(VOLUME_PROPERTY) == volume and edits.offset[probe[INDEX_PROPERTY]].any()
     }
     for index, probe in moved.items():
-        if probe.parent == volume_object:
-            probe.location = (volume_object.matrix_world @ probe.matrix_parent_inverse).inverted() @ Vector(
-                nodes[index]
-            )
+        if probe.parent is None:
+            probe.location = nodes[index]
         else:
             probe.matrix_world.translation = nodes[index]
     return len(moved)
@@ -143,6 +139,16 @@ def placed_count(scene: bpy.types.Scene, volume_object: bpy.types.Object) -> int
     """How many probes were placed for a volume, as objects or as points; None where none are."""
     _, record = _record_of(_find(scene, ""), volume_object)
     return None if record is None else int(np.frombuffer(record["active"], np.uint8).sum())
+
+
+def stand_elsewhere(scene: bpy.types.Scene, volume_object: bpy.types.Object) -> bool:
+    """Whether the volume or its counts have changed since its probes were placed, so that these stand in the wrong
+    places."""
+    _, record = _record_of(_find(scene, ""), volume_object)
+    if record is None:
+        return False
+    same = np.allclose(_placed_box(record), box_of(volume_object), rtol=0, atol=_MOVED)
+    return not same or tuple(record["resolution"]) != resolution_of(volume_object)
 
 
 def placed_points(scene: bpy.types.Scene) -> list[tuple[bpy.types.Object, np.ndarray]]:
@@ -193,15 +199,15 @@ def forget_lost_volumes(scene: bpy.types.Scene) -> None:
             clear_probes(scene, name)
 
 
-def _transform(volume_object: bpy.types.Object) -> np.ndarray:
-    return np.array(volume_object.matrix_world, float)
+def _placed_box(record) -> np.ndarray:
+    """(4, 4) box of the volume when its probes were placed."""
+    return np.frombuffer(record["matrix"], "<f8").reshape(4, 4).copy()
 
 
-def _place_of(probe: bpy.types.Object, volume_object: bpy.types.Object) -> np.ndarray:
-    """(3,) world position. A child's own matrix is out of date between placing it and Blender's next evaluation."""
-    if probe.parent != volume_object or probe.constraints:
-        return np.array(probe.matrix_world.translation, float)
-    return np.array((volume_object.matrix_world @ probe.matrix_parent_inverse @ probe.matrix_basis).translation, float)
+def _place_of(probe: bpy.types.Object) -> np.ndarray:
+    """(3,) world position. An object's matrix is out of date between placing it and Blender's next evaluation."""
+    free = probe.parent is None and not probe.constraints
+    return np.array(probe.location if free else probe.matrix_world.translation, float)
 
 
 def _remember(root, volume: str, volume_object, grid: Grid, active: np.ndarray) -> None:
@@ -210,6 +216,7 @@ def _remember(root, volume: str, volume_object, grid: Grid, active: np.ndarray) 
     root[_RECORDS][volume] = {
         "volume": volume_object,
         "resolution": [int(count) for count in grid.resolution],
+        "matrix": grid.matrix.astype("<f8").tobytes(),
         "active": active.astype(np.uint8).tobytes(),
     }
 
