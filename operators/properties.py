@@ -50,10 +50,10 @@ _SHADING_ITEMS = [
 ]
 
 
-def _preview_changed(_preview, context) -> None:
+def _preview_changed(preview, _context) -> None:
     from .. import viewport  # not above: its drawing is wanted only once somebody looks
 
-    viewport.sync(context.scene)
+    viewport.sync(preview.id_data)
 
 
 class GridlightPreview(bpy.types.PropertyGroup):

@@ -5,6 +5,7 @@ import bpy
 import gridlight
 import numpy as np
 import pytest
+from gridlight.core.grid import Grid
 from gridlight.core.settings import BakeSettings
 from gridlight.scene import probe_objects
 from gridlight.scene.field_storage import load_field, stored_counts
@@ -202,7 +203,7 @@ def test_large_grids_become_points(room):
     scene = bpy.context.scene
     scene.gridlight.keep_all = True
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=2, y_subdivisions=2, size=3)
-    grid = probe_objects.Grid(np.diag([1.6, 1.6, 1.6, 1.0]), (20, 20, 8), "Room")
+    grid = Grid(np.diag([1.6, 1.6, 1.6, 1.0]), (20, 20, 8), "Room")
     probe_objects.place_probes(scene, grid, np.ones(grid.count, np.uint8), room)
     assert not probes(room)
     (volume, points), *others = probe_objects.placed_points(scene)
@@ -292,3 +293,13 @@ def test_parented_and_turned_volumes_are_baked_where_they_stand(room, gpu_contex
     parent.rotation_euler.z = 0.5
     bpy.context.view_layer.update()
     assert has_moved(room)
+
+
+def test_the_command_line_finds_the_same_edits(room):
+    scene = bpy.context.scene
+    bpy.ops.gridlight.place_probes()
+    bpy.data.objects.remove(probes(room)[4])
+    grid = Grid(np.diag([1.6, 1.6, 1.6, 1.0]), (3, 3, 3), "Room")
+    assert probe_objects.edits_of(scene, grid).disabled.sum() == 1
+    assert probe_objects.edits_of(scene, Grid(grid.matrix, (4, 3, 3), "Room")) is None  # --resolution was given
+    assert probe_objects.edits_of(scene, Grid(grid.matrix, (3, 3, 3), "fitted volume")) is None
