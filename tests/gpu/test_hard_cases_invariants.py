@@ -87,7 +87,7 @@ def check_sum(spec):
 
 
 def check_turn(spec):
-    """Quarter turns map texels on texels, but patches and their rays lie elsewhere after one: what is left is chance."""
+    """Quarter turns map texels on texels; patches and their rays lie elsewhere after one, which leaves chance."""
     if spec.volume == "on the walls":
         return
     snapshot, grid = spec.build()
