@@ -55,7 +55,8 @@ def resolve_again(backend: GpuBackend, surfaces: Surfaces, new_numbers: np.ndarr
         shader.image(name, surfaces.textures[name])
     rebind = allocate(1, "flags", "R32F")
     shader.image("rebind", rebind)
-    shader.uniform_int("first_slot", (surfaces.first,))
+    if backend.scene.has_images:  # only they depend on where a texel is seen from; compilers drop the rest
+        shader.uniform_int("first_slot", (surfaces.first,))
     _dispatch_layers(shader, backend.face, surfaces.count)
     return bool(read(rebind, 1, channels=1)[0, 0])
 
