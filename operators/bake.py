@@ -15,7 +15,7 @@ from ..scene.field_storage import remove_field, stored_text
 from . import kept_bakes, names, stale
 from .bake_task import BakeTask
 from .sidebar import redraw_sidebars
-from .volume_choice import chosen_volumes, in_object_mode, volumes_of
+from .volume_choice import can_read_scene, chosen_volumes, in_object_mode, volumes_of
 
 _INTERVAL_SECONDS = 0.01  # between two timer events
 _BUDGET_SECONDS = 0.03  # of work in one; a single step may take longer
@@ -74,7 +74,7 @@ class _BakesVolumes:
 
     @classmethod
     def poll(cls, context):
-        if not in_object_mode(cls, context):
+        if not can_read_scene(cls, context):
             return False
         if _running is not None:
             cls.poll_message_set("A bake is running; wait, or cancel it")

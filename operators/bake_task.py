@@ -102,7 +102,10 @@ class BakeTask:
         for grid in grids:
             probe_file.check_size(grid, self.settings.bands)
         view_layer = scene.view_layers.get(self._view_layer)
-        snapshot = read_scene(scene, view_layer)
+        try:
+            snapshot = read_scene(scene, view_layer)
+        except RuntimeError as error:  # Blender could not evaluate the scene at render quality now
+            raise InputError(f"the scene cannot be read: {error}") from error
         yield
         shown = scene_hash(read_scene(scene, view_layer, live=True))
         for warning in snapshot.warnings:

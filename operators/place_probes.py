@@ -14,7 +14,7 @@ from ..core.errors import GridlightError, InputError
 from ..scene import probe_objects
 from ..scene.read import read_scene
 from . import names
-from .volume_choice import chosen_volumes, grid_of, in_object_mode, volumes_of
+from .volume_choice import can_read_scene, chosen_volumes, grid_of, in_object_mode, volumes_of
 
 
 class GRIDLIGHT_OT_place_probes(bpy.types.Operator):
@@ -27,7 +27,7 @@ class GRIDLIGHT_OT_place_probes(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return in_object_mode(cls, context)
+        return can_read_scene(cls, context)
 
     def execute(self, context):
         scene = context.scene

@@ -17,7 +17,7 @@ from ..scene.field_storage import has_moved, stored_details, stored_text
 from ..scene.read import read_scene
 from . import names
 from .sidebar import redraw_sidebars
-from .volume_choice import in_object_mode, volumes_of
+from .volume_choice import can_read_scene, volumes_of
 
 FRESH, STALE, EDITED = "FRESH", "STALE", "EDITED"
 
@@ -66,7 +66,7 @@ class GRIDLIGHT_OT_check_bake(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return in_object_mode(cls, context)
+        return can_read_scene(cls, context)
 
     def execute(self, context):
         compare(context.scene, context.view_layer)
@@ -116,6 +116,8 @@ def _look_when_at_rest() -> float | None:
     waited = time.monotonic() - _last_edit
     if waited < _REST_SECONDS:
         return _REST_SECONDS - waited
+    if bpy.app.is_job_running("RENDER"):
+        return _REST_SECONDS
     for window in bpy.context.window_manager.windows:
         scene, screen = window.scene, window.screen
         if scene.session_uid not in _edited or screen.is_animation_playing:

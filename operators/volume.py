@@ -14,7 +14,7 @@ from ..core.snapshot import SceneSnapshot
 from ..scene.read import read_scene
 from ..scene.volumes import box_of, create_volume, fit_volume, is_volume, resolution_for, resolution_of
 from . import names
-from .volume_choice import active_volume, in_object_mode, volumes_of
+from .volume_choice import active_volume, can_read_scene, in_object_mode, volumes_of
 
 _FIT_ITEMS = [
     ("SCENE", "Scene", "Around what matters in the scene: ground planes, sky domes and far stragglers are left out"),
@@ -40,7 +40,7 @@ class GRIDLIGHT_OT_add_volume(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return in_object_mode(cls, context)
+        return can_read_scene(cls, context)
 
     def draw(self, _context):
         layout = self.layout
@@ -79,7 +79,7 @@ class GRIDLIGHT_OT_fit_volume(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if not in_object_mode(cls, context):
+        if not can_read_scene(cls, context):
             return False
         if active_volume(context) is None:
             cls.poll_message_set("Select a probe volume first")

@@ -47,6 +47,15 @@ def grid_of(volume: bpy.types.Object) -> Grid:
     return Grid(box_of(volume), resolution_of(volume), volume.name)
 
 
+def can_read_scene(operator, context: bpy.types.Context) -> bool:
+    """For ``poll``: object mode and no render under way, whose evaluation a reading would disturb; or a line that says
+    so."""
+    if bpy.app.is_job_running("RENDER"):
+        operator.poll_message_set("Blender is rendering; wait until it is done")
+        return False
+    return in_object_mode(operator, context)
+
+
 def in_object_mode(operator, context: bpy.types.Context) -> bool:
     """For ``poll``: object mode, or a line that says so."""
     if context.mode == "OBJECT":
