@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """When the preview draws: draw handlers, application handlers and the timer, and how they come and go.
 
-Only the handlers for loading files stay while the preview is off. Everything else exists from the moment that a scene's
-preview is switched on, or a view is rendered by Gridlight's engine, until no view needs it any more.
+Only the handlers for loading files and for undo stay while the preview is off. Everything else exists from the moment
+that a scene's preview is switched on, or a view is rendered by Gridlight's engine, until no view needs it any more.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ _draw_handles: list[object] = []
 def register() -> None:
     bpy.app.handlers.load_pre.append(_before_load)
     bpy.app.handlers.load_post.append(_after_load)
+    for handlers in _history_handlers():
+        handlers.append(_history_moved)
     if not bpy.app.background:
         # While an extension registers, the file's data is out of reach.
         bpy.app.timers.register(_sync_all, first_interval=0.0)
@@ -37,6 +39,8 @@ def unregister() -> None:
     if bpy.app.timers.is_registered(_sync_all):
         bpy.app.timers.unregister(_sync_all)
     stop()
+    for handlers in _history_handlers():
+        handlers.remove(_history_moved)
     bpy.app.handlers.load_post.remove(_after_load)
     bpy.app.handlers.load_pre.remove(_before_load)
 
@@ -65,15 +69,12 @@ def start() -> None:
     for handlers in _change_handlers():
         if _noticed not in handlers:
             handlers.append(_noticed)
-    for handlers in _history_handlers():
-        if _history_moved not in handlers:
-            handlers.append(_history_moved)
     if not bpy.app.timers.is_registered(_tick):
         bpy.app.timers.register(_tick, first_interval=0.0, persistent=True)
 
 
 def stop() -> None:
-    """Frees everything and takes all handlers away but those for loading."""
+    """Frees everything and takes all handlers away but those for loading and undo."""
     points.stop()
     _remove_draw_handlers()
     sessions.drop_all()
@@ -247,9 +248,6 @@ def _stop_noticing() -> None:
     for handlers in _change_handlers():
         if _noticed in handlers:
             handlers.remove(_noticed)
-    for handlers in _history_handlers():
-        if _history_moved in handlers:
-            handlers.remove(_history_moved)
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
 
@@ -277,6 +275,7 @@ def _noticed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 def _history_moved(_scene, _depsgraph=None) -> None:
     for session in sessions.existing():
         session.mark({changes.SURFACES, changes.FIELDS})
+    sync()  # whether previews are on is undone like everything else
 
 
 @persistent

@@ -69,14 +69,16 @@ class LiveBake:
         while self.is_working and time.perf_counter() - started < budget_seconds:
             if self._steps is None:
                 self._steps, self._wanted = self._relight(*self._wanted), None
+            steps, self._steps = self._steps, None  # they are over if they raise
             try:
-                fields = next(self._steps)
+                fields = next(steps)
             except GridlightError as error:  # nothing to bake, or it does not fit the GPU
-                self.message, self._steps = str(error), None
+                self.message = str(error)
                 return {}
             if fields:
-                self.message, self._steps = "", None
+                self.message = ""
                 return fields
+            self._steps = steps
         return {}
 
     def _relight(

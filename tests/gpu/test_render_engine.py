@@ -125,3 +125,18 @@ def test_scenes_without_surface_or_camera_say_so(scene, tmp_path, capfd):
     bpy.data.objects.remove(scene.camera)
     with pytest.raises(RuntimeError, match="[Cc]amera"):
         bpy.ops.render.render()
+
+
+def test_panels_of_lights_materials_and_output_are_there_with_the_engine(scene):
+    def shown():
+        panels = ("DATA_PT_EEVEE_light", "EEVEE_MATERIAL_PT_surface", "EEVEE_WORLD_PT_surface", "RENDER_PT_format")
+        return [
+            "GRIDLIGHT" in getattr(getattr(bpy.types, name), "COMPAT_ENGINES", ())
+            for name in panels
+            if hasattr(bpy.types, name)
+        ]
+
+    assert len(shown()) >= 3 and all(shown())
+    gridlight.unregister()
+    assert not any(shown())
+    gridlight.register()

@@ -350,3 +350,57 @@ def test_many_probes_are_points(person):
     points = person.module("viewport.points")
     assert list(points._batches.values()) == [None]  # drawn since, and nothing was there
     points.stop()
+
+
+@in_blender(backends=("opengl",), timeout=240.0)
+def test_light_follows_during_playback_and_undo(person):
+    lit_room.build(person, radiance=0.0, lamp=True)
+    scene, lamp = bpy.context.scene, bpy.data.objects["Light"]
+    lamp.data.energy = 300
+    for frame, x in ((1, -2.5), (40, 2.5)):
+        lamp.location = (x, 0, 0)
+        lamp.keyframe_insert("location", frame=frame)
+    scene.frame_set(1)
+    scene.frame_end = 40
+    switch(person, enabled=True, mode="INDIRECT", live=True, frame_budget_ms=100.0)
+    with person.at_viewport():
+        bpy.ops.ed.undo_push(message="lamp")
+    sessions = person.module("viewport.sessions")
+    yield from person.wait_until(lambda: sessions.existing() and sessions.existing()[0].gpu, "the scene")
+    session = sessions.existing()[0]
+    with person.at_viewport():
+        bpy.ops.screen.animation_play()
+    lights = []
+
+    def has_followed_twice():
+        light = session._live_fields.get("Room")
+        if light is not None and not any(light is other for other in lights):
+            lights.append(light)
+        return len(lights) >= 2
+
+    yield from person.wait_until(has_followed_twice, "light that follows playback", 120.0)
+    with person.at_viewport():
+        bpy.ops.screen.animation_cancel(restore_frame=True)
+    assert not np.allclose(lights[0].coefficients, lights[1].coefficients)
+    yield from person.wait_until(lambda: not session.is_relighting, "rest", 60.0)
+    with person.at_viewport():
+        bpy.ops.mesh.primitive_cube_add(size=1.0)
+        bpy.ops.ed.undo_push(message="cube")
+    yield from person.wait_until(lambda: not (session.is_relighting or session.is_pending), "light around a cube", 60.0)
+    triangles = len(session.snapshot.triangles)
+    with person.at_viewport():
+        bpy.ops.ed.undo()
+    yield 0.5
+    assert bpy.context.scene.gridlight.preview.enabled
+    session = sessions.existing()[0]
+    yield from person.wait_until(lambda: not (session.is_relighting or session.is_pending), "light without it", 60.0)
+    assert len(session.snapshot.triangles) == triangles - 12
+    assert not session.message, session.message
+    handlers = person.module("viewport.handlers")
+    bpy.context.scene.gridlight.preview.enabled = False
+    assert not handlers._draw_handles
+    with person.at_viewport():
+        bpy.ops.ed.undo()
+    yield 0.3
+    assert bool(handlers._draw_handles) == bpy.context.scene.gridlight.preview.enabled
+    bpy.context.scene.gridlight.preview.enabled = False
