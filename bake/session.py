@@ -221,6 +221,7 @@ class BakeSession:
         self.result = BakeResult(scene=self.backend.scene, capture=last.capture, relit=relit)
         self._stopwatch.seconds = self.result.seconds
         _check(snapshot, self.result)
+        self._lamps_before = len(self.snapshot.lights)
         self.snapshot = snapshot
         captures = self._batches.captures
         had_emitters = self.backend.scene.emitter_count > 0
@@ -247,10 +248,11 @@ class BakeSession:
         light, relit = self.backend.light, self.result.relit
         before = light.source
         emitters = changes.emission and (had_emitters or self.backend.scene.emitter_count > 0)
-        if changes.any_light or changes.world or emitters:  # the world may hold suns
+        lamps = self._changed_lamps(changes)
+        if lamps.any() or changes.lights_removed or changes.world or emitters:
             with self._stopwatch("light"):
-                light.light_again()
-            relit.patches_lit, relit.lights_direct = light.count, len(self.snapshot.lights)
+                relit.lights_direct = light.light_again(lamps, emitters)
+            relit.patches_lit = light.count if relit.lights_direct or emitters else 0
             yield
         if changes.world or changes.emission or changes.reflectance:
             with self._stopwatch("light"):
@@ -272,6 +274,12 @@ class BakeSession:
         self._finish()
         return True
 
+    def _changed_lamps(self, changes: SceneChanges) -> np.ndarray:
+        """(lamp_count,) bool: lamps that differ; after them suns of the world, if it or the number of lamps does."""
+        suns = self.backend.scene.lamp_count - len(changes.lights)
+        moved_up = changes.lights_removed > 0 or len(changes.lights) > self._lamps_before
+        return np.concatenate([changes.lights, np.full(suns, changes.world or moved_up)])
+
     def _light_anew(self) -> Iterator[None]:
         """Light from texel surfaces on; probes that had been moved capture at home first, where placement begins."""
         relit = self.result.relit
@@ -283,7 +291,7 @@ class BakeSession:
         yield
         yield from self._light_from_texels()
         relit.patches_lit = relit.patches_traced = self.backend.light.count
-        relit.lights_direct = len(self.snapshot.lights)
+        relit.lights_direct = self.backend.scene.lamp_count
 
     def _resolve(self) -> Iterator[None]:
         """Materials of texels anew; returns whether patches must be found anew."""

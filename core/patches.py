@@ -29,6 +29,9 @@ from .grid import Grid
 POINTS = 16  # places of a patch where light is measured
 RAYS = 8  # that leave a patch for others, from its points in turn; a multiple of 4
 SAMPLES = (4, 16, 64)  # of direct light: where it is even, uneven, very uneven
+MOST_PARTS = 16  # in which direct light of lamps is kept
+EMITTERS, ALL = "emitters", "all"
+Part = tuple[int, int] | str  # of the light: a range of the list of lamps and suns, EMITTERS, or ALL
 NO_PATCH, NOTHING = -1, -2  # in place of a patch: not bound; nothing to bind
 ANGLE = 0.5  # radians: most edge of a patch as a probe sees it
 _MANY = 32768  # patches whose mean is good with the plain number of rays
@@ -56,11 +59,19 @@ def gather_rays(samples: int) -> int:
     return 4 * -(-samples // 4)
 
 
-def direct_samples(mean: np.ndarray, deviation: np.ndarray) -> np.ndarray:
-    """(N,) index into SAMPLES for patches whose points get irradiance of ``mean`` and ``deviation`` (N,) if nothing
-    stands between: the error of the mean by four points is held against the light of all patches."""
-    error = deviation / np.sqrt(SAMPLES[0]) / max(float(mean.mean()), 1e-30)
+def direct_samples(deviation: np.ndarray, mean_light: float) -> np.ndarray:
+    """(N,) index into SAMPLES for patches whose points get irradiance of ``deviation`` (N,) from a part of the light if
+    nothing stands between: the error of its mean by four points is held against the mean light of all patches."""
+    error = deviation / np.sqrt(SAMPLES[0]) / max(mean_light, 1e-30)
     return np.searchsorted(_UNEVEN, error, side="right")
+
+
+def light_parts(lamps: int, has_emitters: bool) -> list[Part]:
+    """What sends direct light that is kept apart: each of ``lamps``, neighbours together where there are more than
+    MOST_PARTS, and all sampled emitters."""
+    size = max(-(-lamps // MOST_PARTS), 1)
+    parts = [(first, min(first + size, lamps)) for first in range(0, lamps, size)]
+    return [*parts, EMITTERS] if has_emitters else parts
 
 
 class Patches:
@@ -72,7 +83,10 @@ class Patches:
 
     def __init__(self, grid: Grid):
         spacing = grid.cell_size()
-        self.cell = min(_CELL_SHARE * float(np.exp(np.log(spacing).mean())), float(np.linalg.norm(grid.matrix[:3, :3] * 2)) / _LEAST_CELLS)
+        self.cell = min(
+            _CELL_SHARE * float(np.exp(np.log(spacing).mean())),
+            float(np.linalg.norm(grid.matrix[:3, :3] * 2)) / _LEAST_CELLS,
+        )
         self._to_box = np.linalg.inv(grid.matrix[:3, :3]).astype(np.float32)
         self._half = np.linalg.norm(grid.matrix[:3, :3], axis=0).astype(np.float32)
         self._keys = [np.zeros(0, np.uint64) for _ in range(_VARIANTS)]  # sorted

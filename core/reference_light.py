@@ -20,12 +20,25 @@ from .conventions import LUMINANCE
 from .cubemap import direction_to_texel, octahedral_encode, pack_normal, unpack_normal
 from .emitters import sampling_density
 from .grid import Grid
-from .patches import MOST_ROUNDS, NO_PATCH, RAYS, SAMPLES, Patches, direct_samples, effort
+from .patches import (
+    ALL,
+    EMITTERS,
+    MOST_ROUNDS,
+    NO_PATCH,
+    RAYS,
+    SAMPLES,
+    Part,
+    Patches,
+    direct_samples,
+    effort,
+    light_parts,
+)
 from .rays import leave_surface, pull_back, step_off
 from .reference_emitters import ReferenceEmitters
 from .reference_scene import ReferenceScene
 from .sampling import keys_of, light_keys, sample_cosine, sample_r2, shifted
 from .settings import BakeSettings
+from .snapshot import Light
 from .world_map import world_texels
 from .world_suns import extract_suns
 
@@ -98,28 +111,37 @@ class ReferenceLight:
         if lit == 0:
             self._effort = effort(self.patches.count, self.settings.samples)
         numbers = np.arange(lit, self.patches.count)
-        sample_class = direct_samples(*self.spread(self.patches.points, numbers))
+        parts = light_parts(len(self._all_lamps()), self.emitters.count > 0)
+        spread = {part: self.spread(self.patches.points, numbers, part) for part in parts}
+        mean_light = float(sum(mean.mean() for mean, _deviation in spread.values()))
         direct = np.zeros((len(numbers), 3))
-        for index, samples in enumerate(SAMPLES):
-            chosen = np.flatnonzero(sample_class == index)
-            direct[chosen] = self.direct_light(self.patches.points, numbers[chosen], samples * self._effort)
+        for part, (_mean, deviation) in spread.items():
+            sample_class = direct_samples(deviation, mean_light)
+            for index, samples in enumerate(SAMPLES):
+                chosen = np.flatnonzero(sample_class == index)
+                direct[chosen] += self.direct_light(
+                    self.patches.points, numbers[chosen], samples * self._effort, part=part
+                )
         self.direct = np.concatenate([self.direct, direct])
 
-    def spread(self, points: np.ndarray, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and standard deviation (C,) of the luminance of the irradiance at the points of the patches ``numbers``
-        (C,) if nothing stands between."""
+    def spread(self, points: np.ndarray, numbers: np.ndarray, part: Part) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and standard deviation (C,) of the luminance of the irradiance by ``part`` at the points of the patches
+        ``numbers`` (C,) if nothing stands between."""
         keys = keys_of(numbers, 0, self.settings.seed)
         luminance = []
         for index in range(points.shape[1]):
             point, normal = _split(points[numbers, index])
-            irradiance = self._lamps(point, point, normal, keys, index, shadows=False)
-            if self.emitters.count:
-                irradiance += self.emitters.unshadowed(point, normal, keys, index)
+            if part == EMITTERS:
+                irradiance = self.emitters.unshadowed(point, normal, keys, index)
+            else:
+                irradiance = self._lamps(point, point, normal, keys, index, shadows=False, part=part)
             luminance.append(irradiance @ LUMINANCE)
         return np.mean(luminance, axis=0), np.std(luminance, axis=0)
 
-    def direct_light(self, points: np.ndarray, numbers: np.ndarray, samples: int, first_key: int = 0) -> np.ndarray:
-        """(C, 3) irradiance of lamps and emitters: mean over ``samples`` places spread over the points of the patches
+    def direct_light(
+        self, points: np.ndarray, numbers: np.ndarray, samples: int, first_key: int = 0, part: Part = ALL
+    ) -> np.ndarray:
+        """(C, 3) irradiance by ``part`` of the light: mean over ``samples`` places spread over points of the patches
         ``numbers`` (C,)."""
         keys = keys_of(first_key + numbers, 0, self.settings.seed)
         total = np.zeros((len(numbers), 3))
@@ -128,20 +150,27 @@ class ReferenceLight:
             place = index * each // samples if samples < each else index % each
             point, normal = _split(points[numbers, place])
             origin = leave_surface(point, normal)
-            total += self._irradiance(point, origin, normal, keys, shifted(keys, 0, 0, _EMITTER_STREAM), index)
+            total += self._irradiance(point, origin, normal, keys, shifted(keys, 0, 0, _EMITTER_STREAM), index, part)
         return total / samples
 
-    def _irradiance(self, point, origin, normal, lamp_keys, emitter_keys, index) -> np.ndarray:
-        irradiance = self._lamps(point, origin, normal, lamp_keys, index)
-        if self.emitters.count:
+    def _all_lamps(self) -> list[Light]:
+        """Lamps and suns of the world."""
+        return [*self.scene.snapshot.lights, *self._suns]
+
+    def _irradiance(self, point, origin, normal, lamp_keys, emitter_keys, index, part: Part = ALL) -> np.ndarray:
+        irradiance = np.zeros_like(point)
+        if part != EMITTERS:
+            irradiance += self._lamps(point, origin, normal, lamp_keys, index, part=part)
+        if self.emitters.count and part in (EMITTERS, ALL):
             irradiance += self.emitters.irradiance(point, origin, normal, emitter_keys, index)
         return irradiance
 
-    def _lamps(self, point, origin, normal, keys, index, shadows: bool = True) -> np.ndarray:
+    def _lamps(self, point, origin, normal, keys, index, shadows: bool = True, part: Part = ALL) -> np.ndarray:
         """(C, 3) irradiance of lamps and suns of the world by sample ``index`` of the sequences of ``keys`` (C, 3)."""
         total = np.zeros_like(point)
         visible = self.scene.visible if shadows else lambda origins, directions, limits: np.ones(len(origins), bool)
-        for number, light in enumerate([*self.scene.snapshot.lights, *self._suns]):
+        first, stop = (0, None) if part == ALL else part
+        for number, light in list(enumerate(self._all_lamps()))[first:stop]:
             u = sample_r2(light_keys(keys, number), index).astype(float)
             total += direct_light.irradiance(light, point + self.scene.origin, origin, normal, u, visible)
         return total

@@ -14,14 +14,14 @@ import gpu
 import numpy as np
 
 from ..core.grid import Grid
-from ..core.patches import MOST_ROUNDS, POINTS, RAYS, SAMPLES, Patches, direct_samples, effort, gather_rays
+from ..core.patches import MOST_ROUNDS, POINTS, RAYS, Patches, effort, gather_rays
 from ..core.settings import BakeSettings
+from .dispatch import dispatch_linear
+from .patch_direct import PatchDirect
 from .programs import program
 from .scene_textures import SceneTextures
 from .textures import allocate, read, upload
 
-_GROUP = 64
-_GROUPS_IN_ROW = 2**21 // _GROUP  # as LINEAR_THREAD counts
 _RAYS_AT_ONCE = 1 << 20
 _UNSEEN = 1e-6  # weight of patches that no probe sees where iterations are compared: light may still be on its way
 
@@ -44,11 +44,7 @@ class PatchLight:
         self.patches = Patches(grid)
         self._scene, self._settings = scene, settings
         self.world_texels = world_texels
-        self._lit = 0  # patches whose direct light is known
-        self._lit_together: list[tuple[int, int]] = []  # ranges of them
-        self._effort = 1
-        self._direct = np.zeros((0, 4), np.float32)
-        self.direct = upload(self._direct, "patches")
+        self._direct = PatchDirect(scene, settings)
         self._change = gpu.types.GPUTexture((1, 1), format="RGBA32F")
 
     @property
@@ -79,7 +75,7 @@ class PatchLight:
             shader.uniform_sampler("patch_points", points)
             shader.image("visible", visible)
             shader.uniform_int("pair_count", (len(items),))
-            _dispatch(shader, len(items))
+            dispatch_linear(shader, len(items))
             return read(visible, len(items), channels=1)[:, 0] > 0
 
         return sees
@@ -89,69 +85,26 @@ class PatchLight:
 
     def light_new_patches(self) -> None:
         """Direct light of the patches that were bound since the last call."""
-        if self._lit == self.count:
+        if self._direct.count == self.count:
             return
-        if self._lit == 0:
-            self._effort = effort(self.count, self._settings.samples)
-        self._lit_together.append((self._lit, self.count))
-        self._lit = self.count
-        self._light_together(self._lit_together[-1:])
+        if self._direct.count == 0:
+            self._direct.effort = effort(self.count, self._settings.samples)
+        self._direct.add(self.patches.points)
+
+    def light_again(self, changed: np.ndarray, emitters: bool) -> int:
+        """Direct light of all patches where lamps ``changed`` (lamp_count,) bool, or sampled ``emitters`` did. Returns
+        the number of lamps that were computed."""
+        return self._direct.again(self.patches.points, changed, emitters)
+
+    @property
+    def direct(self) -> gpu.types.GPUTexture:
+        """Irradiance by lamps and sampled emitters, an element a patch."""
+        return self._direct.texture
 
     @property
     def source(self) -> np.ndarray:
         """(N, 4) irradiance that bounces begin with: direct, and brought along by rays."""
-        return self._direct + self._brought_values
-
-    def light_again(self) -> None:
-        """Direct light of all patches for other lamps or emitters."""
-        self._direct = self._direct[:0]
-        self._light_together(self._lit_together)
-
-    def _light_together(self, ranges: list[tuple[int, int]]) -> None:
-        """Adds direct light of ``ranges`` of patches, each with numbers of samples chosen by its own mean."""
-        points = upload(self.patches.points, "patches")
-        direct = allocate(self.count, "patches")
-        for first, stop in ranges:
-            sample_class = self._sample_class(points, first, stop)
-            for index, samples in enumerate(SAMPLES):
-                chosen = first + np.flatnonzero(sample_class == index)
-                self._light(points, POINTS, chosen, samples * self._effort, direct)
-        fresh = read(direct, self.count)[len(self._direct) :]
-        self._direct = np.concatenate([self._direct, fresh])
-        self.direct = upload(self._direct, "patches")
-
-    def _sample_class(self, points: gpu.types.GPUTexture, first: int, stop: int) -> np.ndarray:
-        """Index into SAMPLES of each patch from ``first`` to ``stop``."""
-        count = stop - first
-        shader = program("patch_spread_comp", POINTS=POINTS, **self._scene.light_defines)
-        spread = allocate(count, "patches")
-        self._scene.bind_lights(shader)
-        shader.uniform_sampler("patch_points", points)
-        shader.image("spread", spread)
-        for name, value in (("first_patch", first), ("patch_count", count), ("seed", self._settings.seed)):
-            shader.uniform_int(name, (value,))
-        _dispatch(shader, count)
-        mean, deviation = read(spread, count)[:, :2].T
-        return direct_samples(mean, deviation)
-
-    def _light(self, points, points_each: int, chosen: np.ndarray, samples: int, direct, first_key: int = 0) -> None:
-        """Direct light of the patches ``chosen`` (N,) with ``points_each`` places in ``points``, into ``direct``."""
-        rows = np.zeros((len(chosen), 4), np.float32)
-        rows[:, 0] = chosen
-        patches = upload(rows, "patches")
-        shader = program("patch_direct_comp", POINTS=points_each, **self._scene.light_defines)
-        self._scene.bind_lights(shader)
-        shader.uniform_sampler("patches", patches)
-        shader.uniform_sampler("patch_points", points)
-        shader.image("direct", direct)
-        for name, value in (
-            ("patch_count", len(chosen)),
-            ("first_key", first_key),
-            ("samples", samples),
-            ("seed", self._settings.seed),
-        ):
-            shader.uniform_int(name, (value,))
-        _dispatch(shader, len(chosen))
+        return self._direct.values + self._brought_values
 
     # Rays
     # ------------------------------------------------------------------------------------------------------------------
@@ -160,7 +113,7 @@ class PatchLight:
         """Traces the rays between patches, round by round until they find no surface that is no patch yet, and makes
         room for the bounces."""
         ends, brought, reflected = [np.zeros(0)], [np.zeros((0, 4))], [np.zeros((0, 4))]
-        self._rays_each = RAYS * self._effort
+        self._rays_each = RAYS * self._direct.effort
         stop = 0
         for round_ in range(MOST_ROUNDS):
             start, stop = stop, self.count
@@ -235,13 +188,13 @@ class PatchLight:
             ("seed", self._settings.seed),
         ):
             shader.uniform_int(name, (value,))
-        _dispatch(shader, rays)
+        dispatch_linear(shader, rays)
         brought = allocate(count, "patches")
         shader = program("patch_carried_comp", RAYS=rays_each)
         shader.uniform_sampler("carried", carried)
         shader.image("brought", brought)
         shader.uniform_int("patch_count", (count,))
-        _dispatch(shader, count)
+        dispatch_linear(shader, count)
         return _Rays(rays, hits, brought, reflected)
 
     # Bounces
@@ -293,7 +246,7 @@ class PatchLight:
         shader.image("irradiance_out", target)
         shader.uniform_int("patch_count", (count,))
         shader.uniform_int("bounce", (int(bounce),))
-        _dispatch(shader, count)
+        dispatch_linear(shader, count)
 
     def extrapolate(self, factor: float) -> None:
         """irradiance += factor · (irradiance − irradiance of the iteration before)."""
@@ -302,7 +255,7 @@ class PatchLight:
         shader.image("irradiance", self._irradiance[0])
         shader.uniform_int("patch_count", (self.count,))
         shader.uniform_float("factor", factor)
-        _dispatch(shader, self.count)
+        dispatch_linear(shader, self.count)
 
     # Final gather
     # ------------------------------------------------------------------------------------------------------------------
@@ -314,17 +267,11 @@ class PatchLight:
         rays_each = gather_rays(settings.samples)
         direct, result = allocate(count, "texels"), allocate(count, "texels")
         reflects = np.flatnonzero(read(hits, count)[:, 3] >= 0)
-        self._light(hits, 1, reflects, settings.samples, direct, first_key)
+        self._direct.light(hits, 1, reflects, settings.samples, direct, first_key)
         rays = self._trace(hits, 1, 0, count, rays_each, settings.gather, first_key)
         ends = upload(_fours(self._bind_ends(rays.hits, rays.count, MOST_ROUNDS - 1)), "rays")
         self._bounce(direct, rays.brought, rays.reflected, ends, rays_each, count, result)
         return result
-
-
-def _dispatch(shader, threads: int) -> None:
-    groups = -(-threads // _GROUP)
-    if groups:
-        gpu.compute.dispatch(shader, min(groups, _GROUPS_IN_ROW), -(-groups // _GROUPS_IN_ROW), 1)
 
 
 def _fours(values: np.ndarray) -> np.ndarray:

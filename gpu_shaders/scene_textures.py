@@ -165,8 +165,13 @@ class SceneTextures:
             if self.has_images:
                 self.bind(shader, "image_table", "image_texels")
 
+    @property
+    def lamp_count(self) -> int:
+        """Lamps and suns of the world."""
+        return self.light_count + len(self._suns)
+
     def bind_lights(self, shader) -> None:
-        """Binds what a shader compiled with ``light_defines`` declares."""
+        """Binds what a shader compiled with ``light_defines`` declares: all lamps, suns and sampled emitters."""
         if self.emitter_count:
             self.bind_surfaces(shader)
             self.bind_emitters(shader)
@@ -174,7 +179,13 @@ class SceneTextures:
         else:
             self.bind_rays(shader)
         self.bind(shader, "lights")
-        shader.uniform_int("light_count", (self.light_count + len(self._suns),))
+        shader.uniform_int("light_count", (self.lamp_count,))
+
+    def bind_lamps(self, shader) -> None:
+        """Binds what a shader that lights points, compiled with ``ray_defines``, declares: no emitters."""
+        self.bind_rays(shader)
+        self.bind(shader, "lights")
+        shader.uniform_int("light_count", (self.lamp_count,))
 
     def bind_emitters(self, shader) -> None:
         self.bind(shader, "emitters")

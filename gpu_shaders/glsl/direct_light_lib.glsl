@@ -5,6 +5,10 @@
  *   position, kind | color, radius | right, size x | up, size y | back, casts shadow | parameters of the kind
  */
 
+#ifndef FIRST_LIGHT
+#define FIRST_LIGHT 0
+#endif
+
 const int POINT = 0, SPOT = 1, SUN = 2, RECTANGLE = 3, ELLIPSE = 4;
 
 struct LightSample {
@@ -121,7 +125,7 @@ vec3 light_irradiance(int light, vec3 point, vec3 origin, vec3 normal, vec2 u)
 vec3 lamps_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
 {
   vec3 sum = vec3(0.0);
-  for (int light = 0; light < light_count; light++) {
+  for (int light = FIRST_LIGHT; light < light_count; light++) {
     vec2 u = sample_r2(key + uvec3(0u, 0u, uint(light) * 0x9E3779B9u), index);
     sum += light_irradiance(light, point, origin, normal, u);
   }
@@ -132,7 +136,7 @@ vec3 lamps_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index
 vec3 lamps_unshadowed(vec3 point, vec3 normal, uvec3 key, int index)
 {
   vec3 sum = vec3(0.0);
-  for (int light = 0; light < light_count; light++) {
+  for (int light = FIRST_LIGHT; light < light_count; light++) {
     LightSample light_sample = sample_light(light, point, sample_r2(key + uvec3(0u, 0u, uint(light) * 0x9E3779B9u), index));
     sum += light_sample.irradiance * max(dot(light_sample.direction, normal), 0.0);
   }

@@ -95,7 +95,7 @@ class Stages:
         hits = self.hits_texture()
         count = self.gpu.count * 6 * self.settings.face**2
         direct = allocate(count, "test")
-        self.light._light(hits, 1, np.flatnonzero(self.hits()[:, 3] >= 0), samples, direct)
+        self.light._direct.light(hits, 1, np.flatnonzero(self.hits()[:, 3] >= 0), samples, direct)
         return read(direct, count)[:, :3].reshape(self.gpu.count, -1, 3)
 
     # Patches
@@ -113,7 +113,7 @@ class Stages:
     def direct_of(self, patches, samples):
         """(C, 3) direct light of ``patches`` (C,) by so many samples."""
         direct = allocate(self.light.count, "test")
-        self.light._light(upload(self.points, "test"), POINTS, patches, samples, direct)
+        self.light._direct.light(upload(self.points, "test"), POINTS, patches, samples, direct)
         return read(direct, self.light.count)[patches, :3].astype(float)
 
     def direct(self):
