@@ -208,7 +208,7 @@ def test_many_tiny_objects(gpu_context, count):
 
 def test_thousands_of_lamps(gpu_context):
     """Lamps by the hundred, in one place, with their share of the power each."""
-    count = 600
+    count = 300
     grid = Grid.from_bounds([0.5] * 3, [2.0] * 3, (2, 1, 1))
     expected = irradiance(run(read_scene(room()), grid, face=4, bounces=0), grid.positions())
     scene = room(lamp=False)
