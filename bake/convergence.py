@@ -14,7 +14,10 @@ from __future__ import annotations
 
 import math
 
+from ..core.extrapolation import STATES
+
 AUTO_LIMIT = 512
+MANY_MODES = math.inf  # in place of a factor: the last states tell the limit, see core/extrapolation.py
 _PARALLEL = 0.5  # most sine of the angle between two changes for the tail to be added, per (1 − ratio)
 _SINE_ROUNDING = 1e-6  # squared sine below what float32 sums can tell from zero
 _MOST_RATIO = 0.9985  # above it the tail is too uncertain to add
@@ -38,7 +41,8 @@ class Convergence:
 
     def add(self, energy: float, change: float, overlap: float) -> float:
         """Takes |field|², |change|² and change · last change of one iteration. Returns the factor to extrapolate by, 0
-        for none.
+        for none,
+        MANY_MODES where the last STATES states are to tell.
 
         The first iteration is direct light and may be dark: what glows and the world arrive with the first bounce.
         Each further one is a bounce.
@@ -78,6 +82,12 @@ class Convergence:
             self._slowest = max(self._slowest, step)
             self._lengths.clear()
             return step / (1.0 - step)
+        elif (
+            len(self._lengths) >= STATES and self._lengths[-1] < self._lengths[-2]
+        ):  # the first change after an extrapolation is not of its series
+            self._slowest = max(self._slowest, min(self._lengths[-1] / self._lengths[-2], _MOST_RATIO))
+            self._lengths.clear()
+            return MANY_MODES
         return 0.0
 
     def _is_parallel(self, overlap: float) -> bool:

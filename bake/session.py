@@ -32,7 +32,7 @@ from ..gpu_shaders.backend import GpuBackend
 from ..gpu_shaders.change_pass import probes_reached, resolve_again
 from .batches import Batches
 from .capture_choice import choose_capture
-from .convergence import Convergence
+from .convergence import MANY_MODES, Convergence
 from .deringing import dering_field
 from .placement import Placement, judge, place
 from .result import BakeResult, Relit, Reporter
@@ -145,7 +145,9 @@ class BakeSession:
                 self.result.energy.append(luminance)
                 factor = convergence.add(energy, change, overlap)
                 self._reporter.advance(1)
-                if factor:
+                if factor == MANY_MODES:
+                    self.backend.light.extrapolate_modes()
+                elif factor:
                     self.backend.light.extrapolate(factor)
             yield
         self.result.iterations = convergence.iterations

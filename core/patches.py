@@ -11,9 +11,9 @@ Space is divided into cubic cells, and what lies in one cell, faces one way and 
       floor  ──────┼──·───·─║──·──·──┼   leader of the patch left of it and found a second one
                    └────────┴────────┘
 
-s is a share of the probes' spacing and grows with the distance from the volume. Seen from a probe close by, a surface gets
-cells as small as the view demands (ANGLE), so patches are about equally small in every probe's sight. Rays between
-patches end on cells of the plain size.
+s is a share of the probes' spacing and grows with the distance from the volume. Seen from a probe close by, a surface
+gets cells as small as the view demands (ANGLE), so patches are about equally small in every probe's sight. Rays
+between patches end on cells of the plain size.
 
 Everything here is deterministic: patches are numbered in the order in which hits are bound.
 """

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import gpu
 import numpy as np
 
+from ..core.extrapolation import STATES, reduced_rank
 from ..core.grid import Grid
 from ..core.patches import MOST_ROUNDS, POINTS, RAYS, Patches, effort, gather_rays
 from ..core.settings import BakeSettings
@@ -127,7 +128,7 @@ class PatchLight:
         self._ends = upload(_fours(np.concatenate(ends)), "rays")
         self._carry(brought, reflected)
         self._seen = upload(_fours(np.where(self.patches.seen, 1.0, _UNSEEN)), "patches")
-        self._irradiance = [allocate(self.count, "patches") for _ in range(3)]
+        self._irradiance = [allocate(self.count, "patches") for _ in range(STATES)]
 
     def carry_again(self) -> bool:
         """What rays bring along and reflect, for another world or other materials; where they end stays.
@@ -256,6 +257,15 @@ class PatchLight:
         shader.uniform_int("patch_count", (self.count,))
         shader.uniform_float("factor", factor)
         dispatch_linear(shader, self.count)
+
+    def extrapolate_modes(self) -> None:
+        """Goes to the limit that the last states tell of, where they do: all slow modes at once."""
+        states = np.stack([read(texture, self.count)[:, :3] for texture in self._irradiance])
+        limit = reduced_rank(states, np.where(self.patches.seen, 1.0, _UNSEEN))
+        if limit is not None:
+            rows = np.zeros((self.count, 4), np.float32)
+            rows[:, :3] = limit
+            self._irradiance[0] = upload(rows, "patches")
 
     # Final gather
     # ------------------------------------------------------------------------------------------------------------------

@@ -3,19 +3,28 @@
 
 import numpy as np
 import pytest
-from gridlight.bake.convergence import AUTO_LIMIT, Convergence
+from gridlight.bake.convergence import AUTO_LIMIT, MANY_MODES, Convergence
+from gridlight.core.extrapolation import STATES, reduced_rank
 
 
 def run(operator, source, tolerance=2e-3, bounces=None):
     """Iterates x ← source + operator·x as a bake does, extrapolating when told to. Returns (state, convergence)."""
     watch = Convergence(bounces, tolerance)
     older = old = np.zeros_like(source)
+    states = []
     while not watch.done:
         new = source + operator @ old if watch.iterations else source.copy()
         change = new - old
         factor = watch.add(float(new @ new), float(change @ change), float(change @ (old - older)))
         assert watch.iterations < 2 * AUTO_LIMIT
-        older, old = old, new + factor * change
+        states.insert(0, new)
+        if factor == MANY_MODES:
+            limit = reduced_rank(np.stack(states[:STATES])[..., None], np.ones(len(new)))
+            new = new if limit is None else limit[:, 0]
+        elif factor:
+            new = new + factor * change
+        states[0] = new
+        older, old = old, new
     return old, watch
 
 
@@ -96,3 +105,30 @@ def test_a_number_of_bounces_is_kept_exactly(bounces):
     assert watch.converged == (bounces == 7 and watch.missing < 2e-3)
     assert state[0] == pytest.approx(sum(0.5**i for i in range(bounces + 1)), rel=1e-12)
     assert f"{bounces} bounces" in watch.reason
+
+
+def test_many_slow_modes():
+    """Closed cupboards: twelve modes, each at its own slow pace, beside a room that settles soon."""
+    ratios = np.concatenate([np.linspace(0.95, 0.995, 12), np.full(40, 0.5)])
+    source = np.concatenate([np.full(12, 0.02), np.ones(40)])
+    state, watch = run(np.diag(ratios), source)
+    limit = source / (1 - ratios)
+    assert watch.converged and watch.iterations < 300
+    assert np.linalg.norm(state - limit) / np.linalg.norm(limit) < 4e-3
+
+
+def test_reduced_rank_is_exact_for_as_many_modes_as_changes():
+    generator = np.random.default_rng(3)
+    ratios = np.array([0.99, 0.97, 0.9, 0.5, -0.3])
+    states = [np.zeros(5)]
+    source = generator.random(5)
+    for _ in range(STATES - 1):
+        states.insert(0, source + ratios * states[0])
+    found = reduced_rank(np.stack(states)[..., None], np.ones(5))
+    np.testing.assert_allclose(found[:, 0], source / (1 - ratios), rtol=1e-4)
+
+
+def test_what_never_settles_is_not_extrapolated():
+    states = np.arange(STATES, 0, -1, dtype=float)[:, None, None] * np.ones((1, 4, 1))
+    assert reduced_rank(states, np.ones(4)) is None
+    assert reduced_rank(np.ones((STATES, 4, 3)), np.ones(4)) is None
