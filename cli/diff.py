@@ -67,6 +67,7 @@ def compare(first, second) -> dict:
             first.bands == second.bands
             and np.array_equal(first.coefficients, second.coefficients)
             and np.array_equal(first.state, second.state)
+            and np.array_equal(first.gradient, second.gradient)
         ),
         "compared": int(both.sum()),
         "states_differ": int((first.state != second.state).sum()),

@@ -4,8 +4,9 @@
 World space is Blender's: right-handed, Z up, metres. Light is linear RGB radiance. Spherical harmonics are real and
 orthonormal, without the Condon-Shortley phase, ordered l(l+1)+m.
 
-Cube faces, seen from the probe, in the cube's own frame, which CUBE_TURN maps to the world. A face point is ``forward + s·right + t·up`` with s, t in −1..1; texel column grows
-with s, row with t, texel centres at half-integers::
+Cube faces, seen from the probe, in the cube's own frame, which CUBE_TURN maps to the world. A face point is
+``forward + s·right + t·up`` with s, t in −1..1; texel column grows with s, row with t, texel centres at
+half-integers::
 
     face  forward  right  up             +t
      0      +X      −Y    +Z              ^
@@ -18,10 +19,11 @@ with s, row with t, texel centres at half-integers::
 
 import numpy as np
 
-FORMAT_VERSION = (1, 0)  # of the probe file: readers refuse a newer major
+FORMAT_VERSION = (1, 1)  # of the probe file: readers refuse a newer major
 
 # Cubes stand askew: edges of rooms are parallel to the axes, and would enter or leave a whole row of texels at once. In
-# the gallery this takes a quarter off the error. Rational, by Euler and Rodrigues from (9, 2, 3, 2), so exactly a rotation.
+# the gallery this takes a quarter off the error. Rational, by Euler and Rodrigues from (9, 2, 3, 2), so exactly a
+# rotation.
 CUBE_TURN = np.array([[72, -24, 62], [48, 82, -24], [-46, 48, 72]]) / 98
 FACE_FORWARD = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float) @ CUBE_TURN.T
 FACE_RIGHT = np.array([[0, -1, 0], [0, 1, 0], [1, 0, 0], [-1, 0, 0], [1, 0, 0], [1, 0, 0]], float) @ CUBE_TURN.T

@@ -9,6 +9,8 @@
     offset.X .Y .Z              capture position minus node, metres
     depth.mean.00 … .63         mean distance per octahedral texel, metres
     depth.meansq.00 … .63       mean squared distance, metres²
+    dX.L00.R … dZ.L22.B         change of the coefficients that irradiance needs, up to the third band, per metre along
+                                the world's axes: first along X, then Y, then Z (format 1.1; a file without counts as 0)
 
 The text attribute ``gridlight`` is one JSON object: what the channels cannot say (see ``describe``), and ``digest``,
 the SHA-256 of that object without the digest and of all channel bytes, so a damaged file is noticed wherever the
@@ -26,6 +28,7 @@ import numpy as np
 from ..core.conventions import ACTIVE, CULLED, DEPTH_EDGE, FORMAT_VERSION, INVALID, MAX_BANDS, coefficient_names
 from ..core.errors import InputError
 from ..core.field import Field
+from ..core.gradients import gradient_bands
 from ..core.grid import Grid
 from . import openexr_file
 from .openexr_file import reason
@@ -41,6 +44,7 @@ CONVENTIONS = {
     "basis": "real orthonormal spherical harmonics without the Condon-Shortley phase, index l(l+1)+m",
     "irradiance": "sum of A_l L_lm Y_lm(n), A = pi, 2pi/3, pi/4, 0",
     "matrix": "rows; box frame -1..1 to world",
+    "gradient": "of coefficients per metre, world axes",
     "depth": f"octahedral map of {DEPTH_EDGE}x{DEPTH_EDGE} texels, row-major",
 }
 
@@ -51,7 +55,13 @@ def channel_names(bands: int) -> list[str]:
     names += ["state", "validity", "offset.X", "offset.Y", "offset.Z"]
     for statistic in ("mean", "meansq"):
         names += [f"depth.{statistic}.{texel:02d}" for texel in range(DEPTH_TEXELS)]
-    return names
+    return names + gradient_names(bands)
+
+
+def gradient_names(bands: int) -> list[str]:
+    """The last of all channels, which files of format 1.0 do not have."""
+    names = coefficient_names(gradient_bands(bands))
+    return [f"d{axis}.{name}.{color}" for axis in "XYZ" for name in names for color in "RGB"]
 
 
 def _pixel_bytes(grid: Grid, bands: int) -> int:
@@ -135,7 +145,8 @@ def _columns(field: Field) -> list[np.ndarray]:
     """Views of ``field`` in the order of ``channel_names``, (P,) each; the one place that knows where what is."""
     columns = list(field.coefficients.reshape(field.grid.count, -1).T)
     columns += [field.state, field.validity, *field.offset.T]
-    return columns + [*field.depth[:, :, 0].T, *field.depth[:, :, 1].T]
+    columns += [*field.depth[:, :, 0].T, *field.depth[:, :, 1].T]
+    return columns + list(field.gradient.reshape(field.grid.count, -1).T)
 
 
 def _check_header(path: str, header: dict) -> tuple[dict, Grid, int]:
@@ -165,11 +176,18 @@ def _check_header(path: str, header: dict) -> tuple[dict, Grid, int]:
         width, height = high - low + 1
         raise InputError(f"{path} is damaged: {width}×{height} pixels for a resolution of {nx},{ny},{nz}")
     present = {channel.name for channel in header["channels"]}
-    missing = [name for name in channel_names(bands) if name not in present]
+    missing = [name for name in _expected_names(bands, present) if name not in present]
     if missing:
         raise InputError(f"{path} is damaged or incomplete: channel {missing[0]} is missing ({len(missing)} in all)")
     _check_memory(path, 4 * grid.count * len(present))
     return document, grid, bands
+
+
+def _expected_names(bands: int, present) -> list[str]:
+    """The channels that a file with the channels ``present`` must have: gradients all or none."""
+    gradients = gradient_names(bands)
+    names = channel_names(bands)
+    return names if any(name in present for name in gradients) else names[: -len(gradients)]
 
 
 def _check_memory(path: str, pixel_bytes: int) -> None:
@@ -205,7 +223,7 @@ def _take(path: str, channels: dict, document: dict, grid: Grid, bands: int) -> 
     digest = hashlib.sha256(_json(document).encode())
     field = Field.empty(grid, bands)
     field.metadata = document
-    for name, column in zip(channel_names(bands), _columns(field)):
+    for name, column in zip(_expected_names(bands, channels), _columns(field)):
         pixels = channels.pop(name).pixels
         if pixels.dtype != np.float32 or pixels.shape != (ny * nz, nx):
             shown = f"{pixels.dtype} {pixels.shape}"

@@ -17,19 +17,22 @@ import numpy as np
 from ..core.conventions import ACTIVE, CULLED, DEPTH_EDGE, INVALID
 from ..core.errors import InputError
 from ..core.field import Field
+from ..core.gradients import gradient_bands
 from ..core.grid import Grid
 from .volumes import box_of, resolution_of
 
 POINTER = "gridlight_field"
 _VERSION, _FORMAT_VERSION = "gridlight_version", 1
 _NAME_BYTES = 40  # Blender cuts names at 63 bytes
-# Per probe: shape behind the probe axis, by name of the field's attribute. -1: bands² coefficients.
+# Per probe: shape behind the probe axis, by name of the field's attribute. -1: bands² coefficients; -2: those of them
+# that have a gradient.
 _ARRAYS = {
     "coefficients": ("<f4", (-1, 3)),
     "state": ("<u1", ()),
     "validity": ("<f4", ()),
     "offset": ("<f4", (3,)),
     "depth": ("<f4", (DEPTH_EDGE * DEPTH_EDGE, 2)),
+    "gradient": ("<f4", (3, -2, 3)),
 }
 _SAME_PLACE = 1e-5  # of the box's size: what a transform may change by rounding
 
@@ -72,9 +75,12 @@ def load_field(volume_object: bpy.types.Object) -> Field | None:
         return None
     grid = _stored_grid(text, volume_object.name)
     arrays = {}
+    counts = {-1: text["bands"] ** 2, -2: gradient_bands(text["bands"]) ** 2}
     for name, (kind, shape) in _ARRAYS.items():
+        if name == "gradient" and name not in text:
+            continue  # stored before there were any
         values = np.frombuffer(text.get(name, b""), kind)
-        shape = tuple(text["bands"] ** 2 if size < 0 else size for size in shape)
+        shape = tuple(counts.get(size, size) for size in shape)
         if len(values) != grid.count * int(np.prod(shape, initial=1)):
             raise InputError(f"the light stored for '{volume_object.name}' is damaged ({name}); bake the volume again")
         arrays[name] = values.reshape(grid.count, *shape).copy()

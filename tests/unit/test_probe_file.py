@@ -29,6 +29,7 @@ def random_field(resolution=(3, 4, 2), bands=3, seed=0) -> Field:
         rng.normal(size=(count, 3)).astype(np.float32),
         rng.random((count, DEPTH_EDGE**2, 2), np.float32),
         {"device": "test", "settings": {"bands": bands}, "scene_hash": "0", "warnings": ["one"]},
+        rng.normal(size=(count, 3, min(bands, 3) ** 2, 3)).astype(np.float32),
     )
 
 
@@ -50,7 +51,7 @@ def test_round_trip_is_exact(tmp_path_factory, resolution, bands, seed):
     back = probe_file.read(path)
     assert back.grid.resolution == field.grid.resolution and back.grid.name == field.grid.name and back.bands == bands
     assert np.array_equal(back.grid.matrix, field.grid.matrix)
-    for name in ("coefficients", "state", "validity", "offset", "depth"):
+    for name in ("coefficients", "state", "validity", "offset", "depth", "gradient"):
         mine, theirs = getattr(field, name), getattr(back, name)
         assert mine.dtype == theirs.dtype and np.array_equal(mine, theirs), name
     assert {key: back.metadata[key] for key in field.metadata} == field.metadata
@@ -73,6 +74,7 @@ def test_layout_for_other_readers(written):
     expected |= {f"offset.{axis}" for axis in "XYZ"} | {
         f"depth.{s}.{t:02d}" for s in ("mean", "meansq") for t in range(64)
     }
+    expected |= {f"d{axis}.{name}.{color}" for axis in "XYZ" for name in coefficient_names(3) for color in "RGB"}
     assert set(channels) == expected
     for i, j, k in [(0, 0, 0), (2, 1, 0), (1, 3, 1), (2, 3, 1)]:
         flat = i + nx * (j + ny * k)
@@ -80,6 +82,7 @@ def test_layout_for_other_readers(written):
         assert channels["state"].pixels[j + ny * k, i] == field.state[flat]
         assert channels["offset.Z"].pixels[j + ny * k, i] == field.offset[flat, 2]
         assert channels["depth.meansq.17"].pixels[j + ny * k, i] == field.depth[flat, 17, 1]
+        assert channels["dY.L2m1.B"].pixels[j + ny * k, i] == field.gradient[flat, 1, 5, 2]
     assert channels["validity"].pixels.dtype == np.float32 and channels["validity"].pixels.shape == (ny * nz, nx)
     document = json.loads(file.header()["gridlight"])
     assert document["resolution"] == [nx, ny, nz] and document["bands"] == 3 and document["format_version"][0] == 1
@@ -104,6 +107,25 @@ def test_a_file_by_another_program_needs_no_digest(written):
     path, field = written
     edited(path, lambda document: None)
     assert np.array_equal(probe_file.read(path).coefficients, field.coefficients)
+
+
+def test_a_file_of_format_1_0_has_no_gradient(written):
+    path, field = written
+
+    def without(channels):
+        return {name: pixels for name, pixels in channels.items() if name[:2] not in ("dX", "dY", "dZ")}
+
+    edited(path, set_key("format_version", value=[1, 0]), without)
+    back = probe_file.read(path)
+    assert np.array_equal(back.coefficients, field.coefficients)
+    assert back.gradient.shape == field.gradient.shape and not back.gradient.any()
+
+
+def test_gradients_are_there_whole_or_not_at_all(written):
+    path, _field = written
+    edited(path, lambda document: None, lambda channels: {key: v for key, v in channels.items() if key != "dZ.L22.B"})
+    with pytest.raises(InputError, match="channel dZ.L22.B is missing"):
+        probe_file.read(path)
 
 
 def set_key(*keys, value):
