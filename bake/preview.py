@@ -18,6 +18,7 @@ from ..gpu_shaders.scene_textures import SceneTextures
 
 WIDTH, HEIGHT = 960, 540
 _SAMPLES = 8  # per pixel
+_SHADOW_RAYS = 32  # per pixel: scenes with many lamps get fewer samples
 
 
 def write_previews(
@@ -38,7 +39,8 @@ def write_previews(
     """
     camera = snapshot.camera or cameras.suggest(field, WIDTH / HEIGHT)
     renderer = PreviewPass(snapshot, scene, field, field.grid.center)
-    pictures = renderer.render(camera, WIDTH, HEIGHT, _SAMPLES, should_stop=should_stop)
+    samples = int(np.clip(_SHADOW_RAYS // max(len(snapshot.lights), 1), 2, _SAMPLES))
+    pictures = renderer.render(camera, WIDTH, HEIGHT, samples, should_stop=should_stop)
     if pictures is None:
         raise Cancelled("cancelled; nothing was written")
     for path, radiance in zip((picture, probes), pictures):

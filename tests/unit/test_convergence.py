@@ -117,14 +117,13 @@ def test_many_slow_modes():
     assert np.linalg.norm(state - limit) / np.linalg.norm(limit) < 4e-3
 
 
-def test_reduced_rank_is_exact_for_as_many_modes_as_changes():
-    generator = np.random.default_rng(3)
-    ratios = np.array([0.99, 0.97, 0.9, 0.5, -0.3])
-    states = [np.zeros(5)]
-    source = generator.random(5)
+def test_reduced_rank_is_exact_for_few_modes():
+    ratios = np.array([0.98, 0.8, -0.4])
+    states = [np.zeros(3)]
+    source = np.array([1.0, 2.0, 3.0])
     for _ in range(STATES - 1):
         states.insert(0, source + ratios * states[0])
-    found = reduced_rank(np.stack(states)[..., None], np.ones(5))
+    found = reduced_rank(np.stack(states)[..., None], np.ones(3))
     np.testing.assert_allclose(found[:, 0], source / (1 - ratios), rtol=1e-4)
 
 
