@@ -1,31 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which probes, and which shadows, a change of shape can reach. Conservative: what is not reached is as it was.
+"""Which probes a change of shape can reach. Conservative: what is not reached sees what it saw.
 
-Everything is decided with boxes around what changed (core/scene_changes.py) and the distances that a capture kept; no
-ray is traced. A texel can see the change only if
+Decided with boxes around what changed (core/scene_changes.py) and the distances that a capture kept; no ray is traced.
+A texel can see the change only if
 
 * what it hit lay in an old box: it may have hit what is gone, or
 * its ray enters a new box no later than its hit: something may stand in the way now.
 
 Boxes grow by what rounding can move a hit, and by ``spread``: rasterised hits are up to a 256th of a pixel aside.
 
-A shadow can change only if the way from the surface to some point of the light crosses an old or a new box. All ways
-from a point x to a ball of radius r around c lie in the cone x + t·(c − x + r·u), |u| ≤ 1, 0 ≤ t ≤ 1, whose bounds
-along an axis are linear in t; so the cone is clipped against a box like a ray, with two slopes an axis.
-
-P probes, X texels, K boxes, N points; positions in metres, relative to any one origin.
+Readable twin of gpu_shaders/glsl/probe_reach_comp.glsl. P probes, X texels, K boxes; positions in metres, relative to
+any one origin.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from .snapshot import Light
-
 ROUNDING = 1e-5  # of the largest coordinate: what float32 may move a hit, or the edge of a triangle
-RASTER_SPREAD = (
-    2.0 / 256
-)  # of a texel: rasterisers snap corners to 1/256 of a pixel; twice that for both ends of an edge
+RASTER_SPREAD = 2.0 / 256  # of a texel: rasterisers snap both ends of an edge to 1/256 of a pixel
 _FAR = 1e30
 
 
@@ -55,7 +48,7 @@ def probes_that_see(
     reach = np.minimum(distances, _FAR)
     for boxes, old in ((old_boxes, True), (new_boxes, False)):
         for box in boxes:
-            enter, leave = _clip(box, positions[:, None], directions[None], directions[None])
+            enter, leave = _clip(box, positions[:, None], directions[None])
             met = (enter <= leave) & (enter <= reach * (1 + ROUNDING))
             if old:
                 met &= leave >= reach * (1 - ROUNDING)
@@ -63,42 +56,12 @@ def probes_that_see(
     return seen
 
 
-def light_cone(light: Light, origin: np.ndarray) -> np.ndarray:
-    """(5,) x, y, z, radius, kind of what ``light`` shines from, relative to ``origin`` (3,): a ball around it (kind
-    1), or for suns the direction towards it and the tangent of half its angle (kind 0)."""
-    if light.kind == "SUN":
-        half = min(light.angle / 2, np.pi / 2 - 1e-6)
-        return np.array([*np.asarray(light.matrix, float)[:3, 2], np.tan(half), 0.0])
-    radius = np.hypot(light.size_x, light.size_y) / 2 if light.kind == "AREA" else light.radius
-    return np.array([*(np.asarray(light.matrix, float)[:3, 3] - origin), radius, 1.0])
-
-
-def shadows_that_change(points: np.ndarray, cones: np.ndarray, boxes: np.ndarray) -> np.ndarray:
-    """(N,) bool: may the way from ``points`` (N, 3) to one of the lights ``cones`` (L, 5) cross one of ``boxes`` (K, 2,
-    3)?"""
-    found = np.zeros(len(points), bool)
-    for x, y, z, radius, is_ball in cones:
-        target = np.array([x, y, z])
-        way = target - points if is_ball else np.broadcast_to(target, points.shape)
-        for box in boxes:
-            enter, leave = _clip(box, points, way - radius, way + radius)
-            found |= enter <= np.minimum(leave, 1.0 if is_ball else _FAR)
-    return found
-
-
-def _clip(box: np.ndarray, origins: np.ndarray, least: np.ndarray, most: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Interval of t ≥ 0 in which [o + t·least, o + t·most] meets [low, high] on every axis; empty where enter > leave.
-
-    Shapes broadcast. With ``least`` = ``most`` this is a ray against a box.
-    """
-    low, high = box
-    enter, leave = np.zeros(1), np.full(1, _FAR)
-    # o + t·most ≥ low and o + t·least ≤ high, each a half line of t
-    for distance, slope in ((low - origins, most), (origins - high, -least)):
-        with np.errstate(divide="ignore", invalid="ignore"):
-            t = distance / slope
-        begins = np.where(slope > 0, t, np.where((slope == 0) & (distance > 0), _FAR, 0.0))
-        ends = np.where(slope < 0, t, np.where((slope == 0) & (distance > 0), -1.0, _FAR))
-        enter = np.maximum(enter, begins.max(axis=-1))
-        leave = np.minimum(leave, ends.min(axis=-1))
-    return enter, leave
+def _clip(box: np.ndarray, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where rays (…, 3) enter and leave ``box`` (2, 3), from 0 on; enter > leave where they miss it."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        planes = (box.reshape(2, *(1,) * (origins.ndim - 1), 3) - origins) / directions
+    along = directions == 0  # never crosses these planes: within them all the way, or never
+    within = (origins >= box[0]) & (origins <= box[1])
+    enter = np.where(along, np.where(within, 0.0, _FAR), planes.min(axis=0))
+    leave = np.where(along, np.where(within, _FAR, -1.0), planes.max(axis=0))
+    return np.maximum(enter.max(axis=-1), 0.0), leave.min(axis=-1)
