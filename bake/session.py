@@ -265,10 +265,9 @@ class BakeSession:
         yield from judge(self._placement, self._batches, self.backend)
         if self._placement.is_outdated:
             return False
-        change = float(np.linalg.norm(light.source - before))
-        relit.warm_start = self.settings.bounces is None and change < _SMALL_CHANGE * float(
-            np.linalg.norm(light.source)
-        )
+        after = light.source
+        small = np.square(after - before).sum() < _SMALL_CHANGE**2 * np.square(after).sum()
+        relit.warm_start = bool(self.settings.bounces is None and small)
         yield from self._bounce(relit.warm_start)
         if emitters:
             self.backend.forget_emission()
