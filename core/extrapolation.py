@@ -9,21 +9,20 @@ STATES = 9  # that are kept for it
 _LEAST_GAIN = 0.9  # of the last change: an extrapolation that leaves more of it is not worth having
 
 
-def reduced_rank(states: np.ndarray, weights: np.ndarray) -> np.ndarray | None:
+def reduced_rank(states: np.ndarray) -> np.ndarray | None:
     """(N, C) limit of the iteration whose last states are ``states`` (K, N, C), newest first; None if they do not tell.
 
     Reduced rank extrapolation (Eddy 1979; Mesina 1977; Sidi, "Vector Extrapolation Methods", 2017, ch. 2): of all
     combinations Σ γₖ xₖ with Σ γₖ = 1 the one whose next change would be smallest, which for a linear iteration is
-    Σ γₖ (xₖ₊₁ − xₖ); equivalent to GMRES. ``weights`` (N,) weigh the change. Many slow modes, such as cupboards that
-    fill with light at a pace of their own each, are found together.
+    Σ γₖ (xₖ₊₁ − xₖ); equivalent to GMRES. Many slow modes, such as cupboards that fill with light at a pace of their own
+    each, are found together.
     """
     changes = states[:-1] - states[1:]
-    weighted = changes * np.sqrt(weights)[:, None]
     count = len(changes)
     products = np.empty((count, count))
     for i in range(count):  # summed in numpy's fixed order, in float64: the same bytes in every run
         for j in range(i, count):
-            products[i, j] = products[j, i] = np.sum(weighted[i] * weighted[j], dtype=np.float64)
+            products[i, j] = products[j, i] = np.sum(changes[i] * changes[j], dtype=np.float64)
     trace = float(np.trace(products))
     if not 0 < trace < np.inf:
         return None

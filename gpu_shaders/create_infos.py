@@ -232,11 +232,19 @@ def patch_direct_comp(info, defines):
     slot = _scene(info, defines, attributes="HAS_EMITTERS" in defines)
     slot = _emitters(info, defines, slot)
     _samplers(info, "lights", "patches", "patch_points", first=slot)
-    _image(info, 0, "direct")
-    _ints(info, "patch_count", "first_key", "first_light", "light_count", "samples", "seed")
+    _image(info, 0, "sums")
+    _ints(info, "patch_count", "runs", "first_key", "first_light", "light_count", "samples", "seed")
     info.define("FIRST_LIGHT", "first_light")
     info.local_group_size(64, 1, 1)
     return {"compute": ["data_lib", "octahedral_lib", *_light_files(defines), "patch_direct_comp"]}
+
+
+def patch_mean_comp(info, defines):
+    _samplers(info, "patches", "sums")
+    _image(info, 0, "direct", access="READ+WRITE")
+    _ints(info, "patch_count", "runs", "samples")
+    info.local_group_size(64, 1, 1)
+    return {"compute": ["data_lib", "patch_mean_comp"]}
 
 
 def patch_rays_comp(info, defines):

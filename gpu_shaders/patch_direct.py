@@ -19,6 +19,9 @@ from .programs import program
 from .scene_textures import SceneTextures
 from .textures import allocate, read, upload
 
+_SAMPLES_EACH = 16  # of one lamp, or of emitters, that a thread takes
+_LAMPS_AT_ONCE = 32  # that a thread takes
+_THREADS_AT_ONCE = 1 << 20
 _UNLIT = -1  # in place of an index into SAMPLES
 
 
@@ -125,30 +128,59 @@ class PatchDirect:
     def light(
         self, points, points_each: int, chosen: np.ndarray, samples: int, target, first_key: int = 0, part: Part = ALL
     ) -> None:
-        """Direct light by ``part`` of patches or texels ``chosen`` (L,) with ``points_each`` places in ``points``, into
-        ``target``."""
+        """Adds direct light by ``part`` of patches or texels ``chosen`` (L,) with ``points_each`` places in ``points``
+        to ``target``."""
+        for portion in self._portions(part):
+            lamps = 1 if portion == EMITTERS else portion[1] - portion[0]
+            samples_each = max(1, _SAMPLES_EACH // lamps)
+            at_once = max(1, _THREADS_AT_ONCE // -(-samples // samples_each))
+            for start in range(0, len(chosen), at_once):
+                some = chosen[start : start + at_once]
+                self._light_portion(portion, points, points_each, some, samples, samples_each, target, first_key)
+
+    def _portions(self, part: Part) -> list[Part]:
+        """``part`` in portions small enough for one thread, see patch_direct_comp.glsl."""
+        if part == EMITTERS:
+            return [EMITTERS]
+        first, stop = (0, self._scene.lamp_count) if part == ALL else part
+        portions = [(at, min(at + _LAMPS_AT_ONCE, stop)) for at in range(first, stop, _LAMPS_AT_ONCE)]
+        return [*portions, EMITTERS] if part == ALL and self._scene.emitter_count else portions
+
+    def _light_portion(
+        self, part: Part, points, points_each: int, chosen, samples: int, samples_each: int, target, first_key: int
+    ) -> None:
         rows = np.zeros((len(chosen), 4), np.float32)
         rows[:, 0] = chosen
         patches = upload(rows, "patches")
-        shader = program("patch_direct_comp", POINTS=points_each, **self._defines(part))
+        runs = -(-samples // samples_each)
+        sums = allocate(len(chosen) * runs, "patches")
+        shader = program("patch_direct_comp", POINTS=points_each, SAMPLES_EACH=samples_each, **self._defines(part))
         self._bind(shader, part)
         shader.uniform_sampler("patches", patches)
         shader.uniform_sampler("patch_points", points)
-        shader.image("direct", target)
+        shader.image("sums", sums)
         for name, value in (
             ("patch_count", len(chosen)),
+            ("runs", runs),
             ("first_key", first_key),
             ("samples", samples),
             ("seed", self._settings.seed),
         ):
             shader.uniform_int(name, (value,))
+        dispatch_linear(shader, len(chosen) * runs)
+        shader = program("patch_mean_comp")
+        shader.uniform_sampler("patches", patches)
+        shader.uniform_sampler("sums", sums)
+        shader.image("direct", target)
+        for name, value in (("patch_count", len(chosen)), ("runs", runs), ("samples", samples)):
+            shader.uniform_int(name, (value,))
         dispatch_linear(shader, len(chosen))
 
     def _defines(self, part: Part) -> dict:
-        return self._scene.light_defines if part in (EMITTERS, ALL) else self._scene.ray_defines
+        return self._scene.light_defines if part == EMITTERS else self._scene.ray_defines
 
     def _bind(self, shader, part: Part) -> None:
-        (self._scene.bind_lights if part in (EMITTERS, ALL) else self._scene.bind_lamps)(shader)
-        first, stop = {EMITTERS: (0, 0), ALL: (0, self._scene.lamp_count)}.get(part, part)
+        (self._scene.bind_lights if part == EMITTERS else self._scene.bind_lamps)(shader)
+        first, stop = (0, 0) if part == EMITTERS else part
         shader.uniform_int("first_light", (first,))
         shader.uniform_int("light_count", (stop,))

@@ -261,7 +261,7 @@ class PatchLight:
     def extrapolate_modes(self) -> None:
         """Goes to the limit that the last states tell of, where they do: all slow modes at once."""
         states = np.stack([read(texture, self.count)[:, :3] for texture in self._irradiance])
-        limit = reduced_rank(states, np.where(self.patches.seen, 1.0, _UNSEEN))
+        limit = reduced_rank(states)  # patches that no probe sees count as well: what they send is on its way
         if limit is not None:
             rows = np.zeros((self.count, 4), np.float32)
             rows[:, :3] = limit

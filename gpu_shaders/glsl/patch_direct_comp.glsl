@@ -1,20 +1,23 @@
-/* Direct light of patches: irradiance of lamps and sampled emitters, mean over `samples` places spread over the patch's points.
+/* Direct light of patches: irradiance of lamps and sampled emitters at `samples` places spread over the patch's points.
  *
- * Dispatch: one thread an entry of `patches`; groups of 64. The key of a number is (first_key + patch, light, seed); its index counts samples, so the
- * points of a patch share one stratified sequence.
+ * Dispatch: RUNS threads an entry of `patches`, each takes SAMPLES_EACH of the samples; groups of 64. patch_mean_comp puts them together.
+ * (A thread for all samples of a patch would be simpler, but software drivers end every loop of a thread that has gone round 65 535 times.)
+ * The key of a number is (first_key + patch, light, seed); its index counts samples, so the points of a patch share one stratified sequence.
  * patch_points, POINTS elements a patch: position, packed normal. patches: index of a patch in x.
  */
 
 void main()
 {
-  int entry = LINEAR_THREAD;
+  int thread_number = LINEAR_THREAD;
+  int entry = thread_number / runs;
   if (entry >= patch_count) {
     return;
   }
+  int first = (thread_number - entry * runs) * SAMPLES_EACH;
   int patch_index = int(element(patches, entry).x);
   uvec3 key = uvec3(uint(first_key + patch_index), 0u, uint(seed));
   vec3 irradiance = vec3(0.0);
-  for (int i = 0; i < samples; i++) {
+  for (int i = first; i < min(first + SAMPLES_EACH, samples); i++) {
     int place = samples < POINTS ? i * POINTS / samples : i % POINTS;
     vec4 at = element(patch_points, POINTS * patch_index + place);
     vec3 normal = unpack_normal(at.w);
@@ -24,5 +27,5 @@ void main()
     irradiance += emitter_irradiance(at.xyz, origin, normal, key + uvec3(0u, 0u, 0x2545F491u), i);
 #endif
   }
-  imageStore(direct, element_position(patch_index), vec4(irradiance / float(samples), 0.0));
+  imageStore(sums, element_position(thread_number), vec4(irradiance, 0.0));
 }

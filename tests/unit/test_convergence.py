@@ -19,7 +19,7 @@ def run(operator, source, tolerance=2e-3, bounces=None):
         assert watch.iterations < 2 * AUTO_LIMIT
         states.insert(0, new)
         if factor == MANY_MODES:
-            limit = reduced_rank(np.stack(states[:STATES])[..., None], np.ones(len(new)))
+            limit = reduced_rank(np.stack(states[:STATES])[..., None])
             new = new if limit is None else limit[:, 0]
         elif factor:
             new = new + factor * change
@@ -123,11 +123,11 @@ def test_reduced_rank_is_exact_for_few_modes():
     source = np.array([1.0, 2.0, 3.0])
     for _ in range(STATES - 1):
         states.insert(0, source + ratios * states[0])
-    found = reduced_rank(np.stack(states)[..., None], np.ones(3))
+    found = reduced_rank(np.stack(states)[..., None])
     np.testing.assert_allclose(found[:, 0], source / (1 - ratios), rtol=1e-4)
 
 
 def test_what_never_settles_is_not_extrapolated():
     states = np.arange(STATES, 0, -1, dtype=float)[:, None, None] * np.ones((1, 4, 1))
-    assert reduced_rank(states, np.ones(4)) is None
-    assert reduced_rank(np.ones((STATES, 4, 3)), np.ones(4)) is None
+    assert reduced_rank(states) is None
+    assert reduced_rank(np.ones((STATES, 4, 3))) is None
