@@ -237,6 +237,29 @@ def test_a_number_of_bounces_is_that_many():
     assert_same_bake(session.result, bake(new, grid(), session.settings))
 
 
+def sunny(row, column):
+    """A dim sky with a small sun in it."""
+    sky = np.full((64, 128, 3), 0.2, np.float32)
+    sky[row, column] = 4000.0
+    return World(map=sky)
+
+
+def test_suns_of_the_world_come_move_and_go():
+    """They are lamps behind the scene's own in the list."""
+    where = grid((3, 2, 2))
+    session = session_of(replace(rooms(), world=sunny(50, 30)), where)
+    assert session.backend.scene.lamp_count == len(rooms().lights) + 1
+    for new in (
+        replace(rooms(), world=sunny(52, 90)),
+        replace(rooms(), world=sunny(52, 90), lights=rooms().lights[:1]),
+        replace(rooms(), lights=rooms().lights[:1]),
+        replace(rooms(), world=sunny(50, 30)),
+    ):
+        followed(session.relight(new))
+        assert session.result.relit.probes_captured == 0
+        assert_same_bake(session.result, bake(new, where, session.settings))
+
+
 @pytest.mark.nightly
 def test_relighting_with_a_final_gather():
     session = session_of(rooms(), gather=1)
