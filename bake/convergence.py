@@ -49,6 +49,13 @@ class Convergence:
         """
         self.iterations += 1
         self._lengths.append(math.sqrt(change))
+        if not (math.isfinite(energy) and math.isfinite(change)):
+            self.done, self.changes = True, [*self.changes, math.inf]
+            self.reason = (
+                f"not converged after {self.iterations} iterations: light grows without end; "
+                "surfaces send out more than they get, lower their base colour"
+            )
+            return 0.0
         relative = math.sqrt(change / energy) if energy > 0 else 0.0
         self.changes.append(relative)
         ratio = max(self._ratio(), self._slowest)

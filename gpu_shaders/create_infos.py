@@ -295,6 +295,7 @@ def patch_change_comp(info, defines):
     _samplers(info, "irradiance_new", "irradiance_old", "irradiance_older", "patch_seen")
     _image(info, 0, "change")
     _ints(info, "patch_count")
+    info.push_constant("FLOAT", "scale")
     info.local_group_size(256, 1, 1)
     return {"compute": ["data_lib", "patch_change_comp"]}
 

@@ -209,7 +209,8 @@ class PatchLight:
     def iterate(self, bounce: bool) -> tuple[float, float, float, float]:
         """The first irradiance, of direct light, or one bounce more.
 
-        Returns sums over patches in probes' sight: |irradiance|², |change|², change · change before, luminance.
+        Returns sums over patches in probes' sight: |irradiance|², |change|², change · change before, all to one scale;
+        luminance.
         """
         self._irradiance.insert(0, self._irradiance.pop())
         self._bounce(
@@ -222,14 +223,18 @@ class PatchLight:
             self._irradiance[0],
             bounce,
         )
+        brightest = float(np.abs(self.source[:, :3]).max(initial=0.0))
+        scale = 1.0 / brightest if brightest > 0.0 else 1.0
         shader = program("patch_change_comp")
         for name, texture in zip(("irradiance_new", "irradiance_old", "irradiance_older"), self._irradiance):
             shader.uniform_sampler(name, texture)
         shader.uniform_sampler("patch_seen", self._seen)
         shader.image("change", self._change)
         shader.uniform_int("patch_count", (self.count,))
+        shader.uniform_float("scale", scale)
         gpu.compute.dispatch(shader, 1, 1, 1)
-        return tuple(read(self._change, 1)[0].tolist())
+        energy, change, overlap, luminance = read(self._change, 1)[0].tolist()
+        return energy, change, overlap, luminance / scale
 
     def _bounce(
         self, direct, brought, reflected, ends, rays_each: int, count: int, target, bounce: bool = True

@@ -1,7 +1,7 @@
 /* How far iterations are apart: sums over the patches that probes see, of the last three irradiances.
  *
  * Dispatch: one group of 256 threads; fixed order of summation. Writes one texel: |new|², |new − old|²,
- * (new − old)·(old − older), luminance.
+ * (new − old)·(old − older), luminance; of irradiance times `scale`, so that squares of 1e-30 and of 1e30 both fit.
  */
 
 SHARED_ vec4 partial_sums[256];
@@ -11,10 +11,10 @@ void main()
   int lane = int(gl_LocalInvocationID.x);
   vec4 sum = vec4(0.0);
   for (int i = lane; i < patch_count; i += 256) {
-    vec3 fresh = element(irradiance_new, i).rgb;
-    vec3 old = element(irradiance_old, i).rgb;
+    vec3 fresh = element(irradiance_new, i).rgb * scale;
+    vec3 old = element(irradiance_old, i).rgb * scale;
     vec3 change = fresh - old;
-    vec3 last_change = old - element(irradiance_older, i).rgb;
+    vec3 last_change = old - element(irradiance_older, i).rgb * scale;
     float weight = element(patch_seen, i >> 2)[i & 3];
     sum += weight * vec4(dot(fresh, fresh), dot(change, change), dot(change, last_change), dot(fresh, vec3(0.2126, 0.7152, 0.0722)));
   }
