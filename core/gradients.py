@@ -82,13 +82,18 @@ def texel_edges(face: int) -> TexelEdges:
 
 
 def edge_gradient(
-    edges: TexelEdges, radiance: np.ndarray, distance: np.ndarray, nearest: float, bands: int
+    edges: TexelEdges, radiance: np.ndarray, distance: np.ndarray, inside: np.ndarray, nearest: float, bands: int
 ) -> np.ndarray:
     """(P, 3, K, 3) change per metre along the world's axes of the K = ``bands``² coefficients of P probes, of which
     texels send ``radiance`` (P, X, 3) from ``distance`` (P, X) metres, infinite where that is background. Distances
-    count as ``nearest`` metres at least."""
+    count as ``nearest`` metres at least.
+
+    Texels ``inside`` (P, X) bool, dark back faces, have no edges: a probe on a solid's surface would go for its inside,
+    which nothing that asks for light lies in.
+    """
     closeness = 1.0 / np.maximum(distance, nearest)
     speed = np.maximum(closeness[:, edges.first], closeness[:, edges.second])
+    speed[inside[:, edges.first] | inside[:, edges.second]] = 0.0
     jump = (radiance[:, edges.second] - radiance[:, edges.first]) * speed[..., None]
     return np.einsum("ei,ek,pec->pikc", edges.across, sh.basis(edges.direction, bands), jump, optimize=True)
 

@@ -75,11 +75,14 @@ def trilinear(grid: Grid, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return node[..., 0] + resolution[0] * (node[..., 1] + resolution[1] * node[..., 2]), weights
 
 
-def gradient_steps(grid: Grid, points: np.ndarray) -> np.ndarray:
+def gradient_steps(grid: Grid, points: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """(N, 8, 3) cells along each axis for which gradients of the nodes around ``points`` (N, 3) are followed: half of
-    the way from the node to the point clamped to the box, and up to half a cell on from there."""
+    the way from the node to the point clamped to the box, and up to half a cell on from there. All the less the further
+    ``weights`` (N, 8) are from the trilinear ones, because few probes are left, and far ones."""
     _cell, blend, beyond = _place(grid, points)
-    return 0.5 * (blend[:, None] - _CORNERS) + np.clip(beyond, -BEYOND, BEYOND)[:, None]
+    steps = 0.5 * (blend[:, None] - _CORNERS) + np.clip(beyond, -BEYOND, BEYOND)[:, None]
+    share = np.minimum(weights, trilinear(grid, points)[1]).sum(axis=1)
+    return steps * share[:, None, None]
 
 
 def _place(grid: Grid, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -115,7 +118,7 @@ def irradiance(field: Field, points: np.ndarray, normals: np.ndarray) -> np.ndar
     for start in range(0, len(points), _POINTS_AT_ONCE):
         part = slice(start, start + _POINTS_AT_ONCE)
         nodes, weights = lookup_weights(field, points[part], normals[part])
-        steps = gradient_steps(field.grid, points[part]) * weights[..., None]
+        steps = gradient_steps(field.grid, points[part], weights) * weights[..., None]
         blended = np.einsum("nw,nwkc->nkc", weights, field.coefficients[nodes].astype(float))
         led = np.einsum("nwa,nwakc->nkc", steps, gradient[nodes])
         blended[:, : led.shape[1]] += led

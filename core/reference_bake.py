@@ -3,9 +3,9 @@
 against every triangle.
 
 Readable twin of the shaders capture_trace_comp, surface_resolve_comp, object_sightings_comp, probe_statistics_comp,
-field_project_comp, and by reference_light.py and reference_emitters.py of all that light patches and emitters; for
-scenes of some hundred triangles and a few probes. What the GPU stores in fewer bits is rounded here as well, because no
-reference could come near otherwise: images, points of patches and their normals.
+field_project_comp, field_gradient_comp, and by reference_light.py and reference_emitters.py of all that light patches
+and emitters; for scenes of some hundred triangles and a few probes. What the GPU stores in fewer bits is rounded here
+as well, because no reference could come near otherwise: images, points of patches and their normals.
 
 Texels of a probe count face by face, row by row: X = 6·face². P probes, N patches.
 """
@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import culling, dilation, lookup
+from . import culling, dilation, gradients, lookup
 from . import spherical_harmonics as sh
 from .conventions import ACTIVE, CULLED, DEPTH_EDGE, INVALID
 from .cubemap import (
@@ -25,7 +25,6 @@ from .cubemap import (
     texel_directions,
     texel_solid_angles,
 )
-from .emitters import PROBE_POINTS, PROBE_RAYS
 from .field import Field
 from .grid import Grid
 from .orientation import ShellVote, inside_solid
@@ -164,18 +163,40 @@ class ReferenceBake:
 
     def project_emitters(self, surfaces: Surfaces) -> np.ndarray:
         """(P, K, 3) coefficients of what probes see of sampled emitters."""
-        coefficients = np.zeros((len(self.nodes), self.settings.bands**2, 3))
+        by_texels = sh.project(
+            self._emitted_by_texels(surfaces), self.directions, self.solid_angles, self.settings.bands
+        )
+        points = [self._seen_points(slot) for slot in range(len(self.nodes))] if self.light.emitters.count else []
+        for coefficients, seen in zip(by_texels, points):
+            coefficients += sh.project(seen.flux, seen.direction, np.ones(len(seen.flux)), self.settings.bands)
+        return by_texels
+
+    def gradient(self, surfaces: Surfaces, reflected: np.ndarray) -> np.ndarray:
+        """(P, 3, K, 3) change of all coefficients per metre, not limited."""
+        sampled = (surfaces.triangle >= 0) & (self.light.emitters.density[surfaces.triangle] > 0)
+        emitted = np.where(sampled[..., None], self._emitted_by_texels(surfaces), surfaces.emission)
+        nearest, bands = gradients.least_distance(self.grid), gradients.gradient_bands(self.settings.bands)
+        edges = gradients.texel_edges(self.settings.face)
+        radiance = reflected + emitted
+        inside = surfaces.back & ~radiance.any(axis=2)
+        result = gradients.edge_gradient(edges, radiance, surfaces.distance, inside, nearest, bands)
+        for slot in range(len(self.nodes) if self.light.emitters.count else 0):
+            seen = self._seen_points(slot)
+            result[slot] += gradients.point_gradient(
+                seen.direction, seen.distance, seen.normal, seen.flux, nearest, bands
+            )
+        return result
+
+    def _emitted_by_texels(self, surfaces: Surfaces) -> np.ndarray:
+        """(P, X, 3) radiance of sampled emitters in the texels that answer for them."""
+        radiance = np.zeros(surfaces.emission.shape)
         for slot in range(len(self.nodes) if self.light.emitters.count else 0):
             seen = Surfaces(*(value[slot] for value in vars(surfaces).values()))
-            coefficients[slot] = self.light.emitters.project(
-                int(self.nodes[slot]),
-                self.positions[slot],
-                seen,
-                self.directions,
-                self.settings,
-                (PROBE_POINTS, PROBE_RAYS),
-            )
-        return coefficients
+            radiance[slot] = self.light.emitters.texel_radiance(seen, self.directions, self.settings.face)
+        return radiance
+
+    def _seen_points(self, slot: int):
+        return self.light.emitters.seen_points(int(self.nodes[slot]), self.positions[slot], self.settings)
 
 
 def bake(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, offset: np.ndarray | None = None) -> Field:
@@ -191,8 +212,13 @@ def bake(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, offset: np
         hits = job.texel_hits(surfaces).reshape(-1, 4)
         irradiance = job.light.gather(hits, gather_rays(settings.samples), irradiance, 0)
         patch = np.where(patch >= 0, np.arange(patch.size).reshape(patch.shape), patch)
-    coefficients = job.project(surfaces, job.reflected(surfaces, patch, irradiance)) + job.project_emitters(surfaces)
+    reflected = job.reflected(surfaces, patch, irradiance)
+    coefficients = job.project(surfaces, reflected) + job.project_emitters(surfaces)
     field.coefficients = np.zeros((grid.count, settings.bands**2, 3))
     field.coefficients[job.nodes] = coefficients
     field.coefficients = dilation.fill(grid, field.coefficients, field.state == ACTIVE)
+    field.gradient = field.gradient.astype(float)
+    field.gradient[job.nodes] = job.gradient(surfaces, reflected)
+    field.gradient[field.state != ACTIVE] = 0.0
+    field.gradient = gradients.limited(grid, field.gradient, field.coefficients)
     return field

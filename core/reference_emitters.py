@@ -10,12 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import spherical_harmonics as sh
 from .cubemap import direction_to_texel, texel_solid_angles
+from .emitters import PROBE_POINTS, PROBE_RAYS
 from .reference_scene import ReferenceScene, Surfaces
 from .sampling import keys_of, sample_cosine, sample_r2, sample_r3, shifted
+from .settings import BakeSettings
 
 CANDIDATES = 8  # points on emitters of which one is traced
+_LEAST_COSINE = 1e-4  # between an emitter and the way to a probe
 _SHADOW_END = 0.9999  # of the distance to the emitter
 _CHOICE_STREAM, _DIRECTION_STREAM, _PROBE_STREAM = 0x68E31DA4, 0x3C6EF372, 0xB5297A4D
 
@@ -37,6 +39,16 @@ class _Arrival:
     irradiance: np.ndarray  # (N, 3)
     direction: np.ndarray  # (N, 3)
     distance: np.ndarray  # (N,)
+
+
+@dataclass
+class SeenPoints:
+    """Points on emitters in a probe's sight."""
+
+    direction: np.ndarray  # (N, 3) unit, from the probe
+    distance: np.ndarray  # (N,)
+    normal: np.ndarray  # (N, 3) unit
+    flux: np.ndarray  # (N, 3) radiance times the solid angle that the point stands for
 
 
 class ReferenceEmitters:
@@ -151,44 +163,41 @@ class ReferenceEmitters:
     # At probes
     # ------------------------------------------------------------------------------------------------------------------
 
-    def project(
-        self, node: int, position: np.ndarray, seen: Surfaces, directions: np.ndarray, settings, counts: tuple[int, int]
-    ) -> np.ndarray:
-        """(K, 3) coefficients of what the probe of grid ``node`` at ``position`` (3,) sees of the emitters.
-
-        ``seen`` are its texels (X), ``directions`` (X, 3). ``counts``: points considered, and rays that some of them
-        get. Every place on an emitter belongs to texels or to points, whichever are denser as the probe sees it.
+    def texel_radiance(self, seen: Surfaces, directions: np.ndarray, face: int) -> np.ndarray:
+        """(X, 3) radiance of emitters in those of a probe's texels ``seen`` (X) along ``directions`` (X, 3) that answer
+        for them: every place on an emitter belongs to texels or to points, whichever are denser as the probe sees it.
         """
-        solid_angles = np.tile(texel_solid_angles(settings.face).ravel(), 6)
         texel = np.flatnonzero(seen.triangle >= 0)
         texel = texel[self.density[seen.triangle[texel]] > 0]
-        cosine = np.maximum(np.abs(np.einsum("xi,xi->x", directions[texel], seen.normal[texel])), 1e-4)
-        density = counts[0] * self.density[seen.triangle[texel]] * seen.distance[texel] ** 2 / cosine
-        texel = texel[density * solid_angles[texel] < 1.0]
-        by_texels = sh.project(seen.emission[texel], directions[texel], solid_angles[texel], settings.bands)
+        cosine = np.maximum(np.abs(np.einsum("xi,xi->x", directions[texel], seen.normal[texel])), _LEAST_COSINE)
+        density = PROBE_POINTS * self.density[seen.triangle[texel]] * seen.distance[texel] ** 2 / cosine
+        texel = texel[density * np.tile(texel_solid_angles(face).ravel(), 6)[texel] < 1.0]
+        radiance = np.zeros((len(directions), 3))
+        radiance[texel] = seen.emission[texel]
+        return radiance
 
-        index = np.arange(counts[0])
+    def seen_points(self, node: int, position: np.ndarray, settings: BakeSettings) -> SeenPoints:
+        """Points on emitters that the probe of grid ``node`` at ``position`` (3,) sees and answer for their light."""
+        index = np.arange(PROBE_POINTS)
         keys = np.broadcast_to(keys_of(np.array(node), _PROBE_STREAM, settings.seed), (len(index), 3))
         place = sample_r2(keys, index).astype(float)
         jitter = sample_r2(shifted(keys, 1, 0, 0), index)[:, 0].astype(float)
-        emitter = self.sample(np.column_stack([place, (index + jitter) / counts[0]]))
+        emitter = self.sample(np.column_stack([place, (index + jitter) / PROBE_POINTS]))
         offset = emitter.point - position
         distance = np.sqrt(np.maximum(np.einsum("ni,ni->n", offset, offset), 1e-20))
         direction = offset / distance[:, None]
-        cosine = np.maximum(np.abs(np.einsum("ni,ni->n", direction, emitter.normal)), 1e-4)
-        density = counts[0] * emitter.density * distance**2 / cosine
+        cosine = np.maximum(np.abs(np.einsum("ni,ni->n", direction, emitter.normal)), _LEAST_COSINE)
+        density = PROBE_POINTS * emitter.density * distance**2 / cosine
         face, row, column = direction_to_texel(direction, settings.face)
-        in_texels = density * solid_angles[(face * settings.face + row) * settings.face + column] < 1.0
+        in_texels = density * texel_solid_angles(settings.face)[row, column] < 1.0
         radiance = np.where(in_texels[:, None], 0.0, emitter.radiance / density[:, None])
         weight = radiance.sum(axis=1)
-        if not weight.any():
-            return by_texels
         # One ray each time the running sum of the weights has grown by an equal step.
-        step = weight.sum() / counts[1]
-        passed = np.floor(np.cumsum(weight) / step + 0.5)
+        step = weight.sum() / PROBE_RAYS
+        passed = np.floor(np.cumsum(weight) / (step or 1.0) + 0.5)
         rays = np.diff(passed, prepend=0.0)
         sent = np.flatnonzero(rays)
         origins = np.broadcast_to(position, (len(sent), 3))
         sent = sent[self.scene.visible(origins, direction[sent], distance[sent] * _SHADOW_END)]
-        share = rays[sent] * step / weight[sent]
-        return by_texels + sh.project(radiance[sent], direction[sent], share, settings.bands)
+        flux = radiance[sent] * (rays[sent] * step / weight[sent])[:, None]
+        return SeenPoints(direction[sent], distance[sent], emitter.normal[sent], flux)

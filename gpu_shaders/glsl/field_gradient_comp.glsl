@@ -6,15 +6,18 @@
  * Dispatch: one group of GROUP threads a probe.
  */
 
-/* Radiance that a texel sends, and one over its distance: 0 for background. */
+/* Radiance that a texel sends, and one over its distance: 0 for background, −1 for a dark back face. */
 vec4 texel_seen(int texel, int probe)
 {
   ivec3 at = ivec3(texel % FACE, texel / FACE, first_layer + probe);
   vec4 emitted = texelFetch(emission, at, 0);
   int own = own_texels != 0 ? probe * 6 * FACE * FACE + texel : -1;
   vec3 radiance = texel_reflected(at, own) * 0.3183098861837907 + (emitted.a == 0.0 ? emitted.rgb : texel_emitter(at));
-  float distance = abs(texelFetch(geometry, at, 0).z);
-  return vec4(radiance, distance < NO_SURFACE ? 1.0 / max(distance, nearest) : 0.0);
+  float distance = texelFetch(geometry, at, 0).z;
+  if (distance < 0.0 && radiance == vec3(0.0)) {
+    return vec4(0.0, 0.0, 0.0, -1.0);
+  }
+  return vec4(radiance, abs(distance) < NO_SURFACE ? 1.0 / max(abs(distance), nearest) : 0.0);
 }
 
 void main()
@@ -31,6 +34,9 @@ void main()
     vec4 middle = element(texel_edges, 2 * edge + 1);
     vec4 first = texel_seen(int(across.w), probe);
     vec4 second = texel_seen(int(middle.w), probe);
+    if (first.w < 0.0 || second.w < 0.0) {
+      continue;
+    }
     vec3 change = (second.rgb - first.rgb) * max(first.w, second.w);
     float basis[COEFFICIENTS];
     sh_basis(middle.xyz, basis);

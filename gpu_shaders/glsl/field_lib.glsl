@@ -16,7 +16,7 @@ vec3 coefficient_at(int node, int index, vec3 step)
 
 /* Irradiance at `normal` of the field, blended over the corners of a cell, each led to the point by its gradient: see lookup_cell.
  * May be negative where the series rings. */
-vec3 field_irradiance(int first_node, vec4 weights0, vec4 weights1, vec3 lead, vec3 normal)
+vec3 field_irradiance(int first_node, vec4 weights0, vec4 weights1, vec4 lead, vec3 normal)
 {
   ivec3 resolution = ivec3(grid_info[3].xyz);
   float transfer[COEFFICIENTS];
@@ -27,9 +27,10 @@ vec3 field_irradiance(int first_node, vec4 weights0, vec4 weights1, vec3 lead, v
     if (weight > 0.0) {
       ivec3 corner_step = ivec3(corner & 1, (corner >> 1) & 1, corner >> 2);
       int node = first_node + corner_step.x + resolution.x * (corner_step.y + resolution.y * corner_step.z);
+      vec3 step = lead.w * (lead.xyz - 0.5 * vec3(corner_step));
       vec3 value = vec3(0.0);
       for (int i = 0; i < TRANSFER_COEFFICIENTS; i++) {
-        value += transfer[i] * coefficient_at(node, i, lead - 0.5 * vec3(corner_step));
+        value += transfer[i] * coefficient_at(node, i, step);
       }
       sum += weight * value;
     }

@@ -74,20 +74,23 @@ ivec3 first_corner(vec3 lattice)
 }
 
 /* First corner of the cell around `point` and the weights of its eight corners (x fastest), which sum to 1. `lead`: cells for which
- * the gradient of the first corner is followed; half a step less for every step to another corner. */
-ivec3 lookup_cell(vec3 point, vec3 normal, out float weights[8], out vec3 lead)
+ * the gradient of the first corner is followed, half a step less for every step to another corner; share of the trilinear blend that
+ * visibility left. */
+ivec3 lookup_cell(vec3 point, vec3 normal, out float weights[8], out vec4 lead)
 {
   vec3 beyond;
   vec3 lattice = lattice_position(point, beyond);
   ivec3 cell = first_corner(lattice);
   vec3 blend = lattice - vec3(cell);
-  lead = 0.5 * blend + clamp(beyond, -BEYOND, BEYOND);
+  lead = vec4(0.5 * blend + clamp(beyond, -BEYOND, BEYOND), 0.0);
   vec3 seen_point = point + normal * grid_info[4].x;
+  float plain[8];
   float sum = 0.0;
   for (int corner = 0; corner < 8; corner++) {
     ivec3 step = ivec3(corner & 1, (corner >> 1) & 1, corner >> 2);
     vec3 part = mix(1.0 - blend, blend, vec3(step));
     float weight = part.x * part.y * part.z;
+    plain[corner] = weight;
     if (weight > 0.0) {
       vec4 node = element(grid_nodes, node_index(cell + step));
       if (node.w >= 0.0) {
@@ -102,6 +105,7 @@ ivec3 lookup_cell(vec3 point, vec3 normal, out float weights[8], out vec3 lead)
   }
   for (int corner = 0; corner < 8; corner++) {
     weights[corner] /= sum;
+    lead.w += min(weights[corner], plain[corner]);
   }
   return cell;
 }
