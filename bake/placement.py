@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core import relocation
+from ..core import clearance, relocation
 from ..core.conventions import INVALID
 from ..core.grid import Grid
 from ..core.orientation import ShellVote, inside_solid
@@ -30,13 +30,17 @@ class Placement:
     went_back: np.ndarray  # (S,) bool: was moved, saw no light there and went home
 
     @classmethod
-    def at_home(cls, grid: Grid, nodes: np.ndarray, by_hand_m: np.ndarray) -> Placement:
-        """Nothing is known yet; ``by_hand_m`` (P, 3) are the user's own moves of all probes of the grid."""
+    def at_home(cls, grid: Grid, nodes: np.ndarray, by_hand_m: np.ndarray, obstacles: np.ndarray) -> Placement:
+        """Clear of ``obstacles`` (T, 3, 3), else nothing is known yet; ``by_hand_m`` (P, 3) are the user's own moves of
+        all probes of the grid."""
         count = len(nodes)
+        by_hand = by_hand_m[nodes].any(axis=1)
+        home = (grid.positions() + by_hand_m)[nodes]
+        home[~by_hand] = clearance.keep_clear(grid, nodes[~by_hand], home[~by_hand], obstacles)
         return cls(
             nodes,
-            (grid.positions() + by_hand_m)[nodes],
-            by_hand_m[nodes].any(axis=1),
+            home,
+            by_hand,
             np.zeros((count, 3)),
             np.zeros((count, 4)),
             np.zeros(count, bool),
@@ -63,13 +67,15 @@ class Placement:
         return result, bool(inside.all())
 
 
-def place(placement: Placement, batches: Batches, backend: GpuBackend, grid: Grid) -> Iterator[None]:
+def place(
+    placement: Placement, batches: Batches, backend: GpuBackend, grid: Grid, obstacles: np.ndarray
+) -> Iterator[None]:
     """Fills ``placement`` from texel surfaces captured at home and bound to patches: lights those and judges."""
     with batches.stopwatch("light"):
         backend.light.light_new_patches()
     yield from judge(placement, batches, backend)
     placement.misplaced = relocation.misplaced(placement.shares) & ~placement.by_hand
-    yield from _relocate(placement, batches, backend, grid)
+    yield from _relocate(placement, batches, backend, grid, obstacles)
 
 
 def judge(placement: Placement, batches: Batches, backend: GpuBackend) -> Iterator[None]:
@@ -85,11 +91,12 @@ def judge(placement: Placement, batches: Batches, backend: GpuBackend) -> Iterat
     placement.shares = backend.read_shares()
 
 
-def _relocate(placement: Placement, batches: Batches, backend: GpuBackend, grid: Grid) -> Iterator[None]:
-    """Moves probes that stand in or behind walls. One that sees no light from its new place either goes back."""
+def _relocate(
+    placement: Placement, batches: Batches, backend: GpuBackend, grid: Grid, obstacles: np.ndarray
+) -> Iterator[None]:
+    """Moves probes that stand in or behind walls. One that sees no light from its new place either goes back. Where
+    they came out, and in rooms with their normals outwards, they keep clear of surfaces too."""
     candidates = np.flatnonzero(placement.misplaced)
-    if not len(candidates):
-        return
     step = placement.step
     for index in range(batches.count):
         slots = batches.slots_of(index, candidates)
@@ -97,9 +104,16 @@ def _relocate(placement: Placement, batches: Batches, backend: GpuBackend, grid:
             surfaces = batches.bound(index)
             step[slots] = relocation.moves(grid, placement.home[slots], backend.exits(surfaces, slots - surfaces.first))
         yield
+    settled = (~placement.misplaced | placement.moved) & ~placement.by_hand
+    clear = clearance.keep_clear(
+        grid, placement.nodes[settled], (placement.home + step)[settled], obstacles, also_behind=True
+    )
+    step[settled] = clear - placement.home[settled]
     moved = np.flatnonzero(placement.moved)
+    if not len(moved):
+        return
     yield from _stand(placement, moved, batches, backend)
-    back = moved[_in_the_dark(placement.shares[moved])]
+    back = moved[_in_the_dark(placement.shares[moved]) & placement.misplaced[moved]]
     placement.went_back[back] = True
     step[back] = 0.0
     yield from _stand(placement, back, batches, backend)

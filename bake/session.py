@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core import culling, dilation, gradients
+from ..core import clearance, culling, dilation, gradients
 from ..core.change_reach import RASTER_SPREAD, grown
 from ..core.conventions import ACTIVE, CULLED, INVALID
 from ..core.errors import InputError
@@ -102,15 +102,18 @@ class BakeSession:
         if not self.settings.keep_all:
             state[~culling.needed_nodes(self.grid, self.snapshot.triangle_positions)] = CULLED
         state[self._edits.disabled] = CULLED
-        if not (state == ACTIVE).any():
+        if self._edits.disabled.any() and not (state == ACTIVE).any():
             raise InputError(
                 f"{self.grid.name}: every probe is switched off; bring some back with Reset in the Volume panel"
             )
         return state
 
+    def _obstacles(self) -> np.ndarray:
+        return clearance.obstacles(self.grid, self.snapshot)
+
     def _stand_at_home(self) -> None:
         """Puts the probes of all slots where they belong, with no light yet."""
-        self._placement = Placement.at_home(self.grid, self._batches.nodes, self._edits.offset)
+        self._placement = Placement.at_home(self.grid, self._batches.nodes, self._edits.offset, self._obstacles())
         self.backend.set_probes(self._batches.nodes, self._placement.home)
         self.backend.allocate_field()
 
@@ -121,7 +124,7 @@ class BakeSession:
         for index in range(batches.count):
             self._reporter.advance(batches.bound(index).count)
             yield
-        yield from place(self._placement, batches, self.backend, self.grid)
+        yield from place(self._placement, batches, self.backend, self.grid, self._obstacles())
         moved = int(self._placement.moved.sum())
         if moved:
             result.notes.append(f"{moved} probes in or behind walls were moved out, at most half a cell")
@@ -186,7 +189,7 @@ class BakeSession:
             field.state[:] = state
             field.validity[nodes] = 1.0 - placement.shares[:, 0]
             field.offset[:] = self._edits.offset
-            field.offset[nodes] += placement.step
+            field.offset[nodes] = placement.home + placement.step - self.grid.positions()[nodes]
             field.coefficients[nodes] = backend.read_field()
             field.coefficients = dilation.fill(self.grid, field.coefficients, state == ACTIVE)
             field.depth[nodes] = backend.read_depth()
@@ -351,8 +354,8 @@ def _check(snapshot: SceneSnapshot, result: BakeResult) -> None:
     """Refuses scenes without surface, warns of those without light."""
     if not len(snapshot.triangles):
         raise InputError(f"scene '{snapshot.name}' has no surface that renders; add or unhide a mesh")
-    emits = any(max(m.emission) > 0 for m in snapshot.materials)
-    world = snapshot.world.map is not None or max(snapshot.world.color) > 0
+    emits = any(any(m.emission) for m in snapshot.materials)
+    world = snapshot.world.map is not None or any(snapshot.world.color)
     if not (snapshot.lights or emits or world):
         result.warnings.append(
             f"scene '{snapshot.name}' has no light: no lamp, emission or world; the field is black. Add a light or "
