@@ -11,7 +11,6 @@
  */
 
 SHARED_ float run_weights[GROUP];
-SHARED_ float candidate_weights[CANDIDATE_COUNT];
 
 const int RUN = CANDIDATE_COUNT / GROUP;
 
@@ -70,11 +69,10 @@ void main()
     }
   }
   uvec3 key = uvec3(uint(slot.w), 0xB5297A4Du, uint(seed));
-  float run_weight = 0.0;
+  float weights[RUN], run_weight = 0.0;
   for (int i = 0; i < RUN; i++) {
-    float weight = candidate(slot.xyz, key, lane * RUN + i).weight;
-    candidate_weights[lane * RUN + i] = weight;
-    run_weight += weight;
+    weights[i] = candidate(slot.xyz, key, lane * RUN + i).weight;
+    run_weight += weights[i];
   }
   run_weights[lane] = run_weight;
   barrier();
@@ -85,7 +83,7 @@ void main()
   }
   float step = total / float(samples);
   for (int i = 0; i < RUN && total > 0.0; i++) {
-    float after = before + candidate_weights[lane * RUN + i];
+    float after = before + weights[i];
     float rays = floor(after / step + 0.5) - floor(before / step + 0.5);
     before = after;
     if (rays == 0.0) {
