@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from gridlight.bake.job import run_bake
 from gridlight.core import lookup
-from gridlight.core.direct_light import tangent_frame
+from gridlight.core.sampling import tangent_frame
 from gridlight.core.snapshot import Image, Light, Material, SceneSnapshot, World
 
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
@@ -64,6 +64,22 @@ def box(low=(-1, -1, -1), high=(1, 1, 1)):
     corners = np.array([[a, b, c] for c in z for b in y for a in x])
     quads = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
     return corners[np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])]
+
+
+def corridor():
+    """(T, 3, 3) triangles of a closed corridor with a square section of 1 m and two corners, normals inwards: from
+    x = 0 to 4 along y = 0..1, on to y = 4, and back along the far side to x = 0."""
+    outline = np.array([(0, 0), (4, 0), (4, 4), (0, 4), (0, 3), (3, 3), (3, 1), (0, 1)], float)
+    sides = []
+    for (ax, ay), (bx, by) in zip(outline, np.roll(outline, -1, axis=0)):
+        a, b, c, d = (ax, ay, 0), (bx, by, 0), (bx, by, 1), (ax, ay, 1)
+        sides += [(a, c, b), (a, d, c)]
+    squares = [(0, 0, 4, 1), (3, 1, 4, 3), (0, 3, 4, 4)]
+    for x0, y0, x1, y1 in squares:
+        a, b, c, d = (x0, y0), (x1, y0), (x1, y1), (x0, y1)
+        sides += [tuple((*p, 0.0) for p in triangle) for triangle in ((a, b, c), (a, c, d))]
+        sides += [tuple((*p, 1.0) for p in triangle) for triangle in ((a, c, b), (a, d, c))]
+    return np.array(sides, float)
 
 
 def furnace(albedo, emission=1.0, inward=False):

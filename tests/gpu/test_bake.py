@@ -68,13 +68,6 @@ def test_a_furnace_that_loses_nothing_never_settles():
     assert any("not converged" in note and "base colour" in note for note in result.notes)
 
 
-@pytest.mark.parametrize("bounces", [0, 1, 3])
-def test_a_number_of_bounces_is_that_many(bounces):
-    result = bake(furnace(0.5), room_grid((2, 2, 2)), BakeSettings(bounces=bounces))
-    assert result.iterations == bounces + 1
-    np.testing.assert_allclose(irradiance_at_nodes(result.field), sum(0.5**i for i in range(bounces + 1)), rtol=1e-5)
-
-
 @pytest.mark.parametrize("capture", ["raster", "trace"])
 def test_uniform_world_is_exact(capture):
     """Nothing in reach: every probe has exactly the world's radiance, whether all are kept or none is needed but the
@@ -95,39 +88,32 @@ def test_no_light_is_black_and_says_so():
     assert any("no light" in warning for warning in result.warnings)
 
 
-def floor_stages(light, **settings):
-    """A large white floor one metre below one probe; no bounce."""
+def floor_irradiance(light, samples=1, **settings):
+    """(X, 3) points of a large floor one metre below one probe, as its texels within 5 m see them, and (X, 3)
+    irradiance there."""
     floor = [[[-50, -50, -1], [50, -50, -1], [50, 50, -1]], [[-50, -50, -1], [50, 50, -1], [-50, 50, -1]]]
     snapshot = snapshot_of(floor, materials=[Material("white", (1.0, 1.0, 1.0))], lights=[light])
-    return Stages(
-        snapshot,
-        Grid.from_bounds([-0.1] * 3, [0.1] * 3, (1, 1, 1)),
-        BakeSettings(keep_all=True, **{"samples": 1, **settings}),
+    stages = Stages(
+        snapshot, Grid.from_bounds([-0.1] * 3, [0.1] * 3, (1, 1, 1)), BakeSettings(keep_all=True, **settings)
     )
-
-
-def floor_texels(stages):
-    """(X, 3) points and (X, 3) irradiance at the texels that see the floor within 5 m; the floor is white, so E = π
-    L."""
-    surfaces = stages.surfaces()
-    points = stages.reference.points(surfaces)[0] + stages.grid.center
-    seen = (surfaces.triangle[0] >= 0) & (np.abs(points).max(axis=1) < 5)
-    return points[seen], np.pi * stages.source()[0][seen]
+    hits = stages.hits()
+    near = (hits[:, 3] >= 0) & (np.abs(hits[:, :3]).max(axis=1) < 5)
+    assert near.sum() > 100
+    return hits[near, :3] + stages.grid.center, stages.irradiance_at_texels(samples)[0][near]
 
 
 def test_point_light_above_a_plane():
     light = Light("lamp", "POINT", (7.0, 5.0, 3.0), frame((0.5, 0.3, 1.0)))
-    points, found = floor_texels(floor_stages(light))
+    points, found = floor_irradiance(light)
     offset = np.array([0.5, 0.3, 1.0]) - points
     expected = 2.0 / np.linalg.norm(offset, axis=1) ** 3
-    assert len(points) > 100
-    np.testing.assert_allclose(found, expected[:, None] * [7.0, 5.0, 3.0], rtol=1e-5)
+    np.testing.assert_allclose(found, expected[:, None] * [7.0, 5.0, 3.0], rtol=2e-5)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.00918, 0.5])
 def test_sun_above_a_plane(angle):
     light = Light("sun", "SUN", (3.0, 3.0, 3.0), frame(towards=(0.6, 0, -0.8)), angle=angle)
-    _points, found = floor_texels(floor_stages(light, samples=256 if angle else 1, face=16))
+    _points, found = floor_irradiance(light, 256 if angle else 1)
     np.testing.assert_allclose(found, 3 * 0.8, rtol=1e-5 if angle == 0 else 5e-3)
 
 
@@ -137,9 +123,7 @@ def test_area_light_above_a_plane_against_its_form_factor():
     light = Light(
         "panel", "AREA", (2.0, 2.0, 2.0), np.eye(4) + np.outer([0, 0, 2, 0], [0, 0, 0, 1]), size_x=2.0, size_y=1.0
     )
-    # samples are spread over a texel's footprint as well as over the light: texels must be small to stand for their
-    # centres
-    points, found = floor_texels(floor_stages(light, samples=512, face=64))
+    points, found = floor_irradiance(light, 512)
 
     def corner(width, depth, height=3.0):
         a, b = width / height, depth / height
@@ -148,7 +132,7 @@ def test_area_light_above_a_plane_against_its_form_factor():
 
     x, y = points[:, 0], points[:, 1]
     factor = sum(corner(1.0 + sx * x, 0.5 + sy * y) for sx in (-1, 1) for sy in (-1, 1))
-    np.testing.assert_allclose(found, np.tile(2 * np.pi * factor[:, None], 3), rtol=4e-2)
+    np.testing.assert_allclose(found, np.tile(2 * np.pi * factor[:, None], 3), rtol=1e-2)
     np.testing.assert_allclose(found.sum(axis=0), 2 * np.pi * factor.sum(), rtol=1e-3)
 
 
@@ -168,12 +152,11 @@ def test_a_ground_plane_does_not_shadow_itself(size, slanted, capture):
     rotation *= np.linalg.det(rotation)
     sun = Light("sun", "SUN", (3.0, 3.0, 3.0), frame(towards=rotation @ [0.6, 0, -0.8]))
     snapshot = snapshot_of(ground(size, rotation), materials=[Material("white", (1.0, 1.0, 1.0))], lights=[sun])
-    stages = Stages(
-        snapshot, Grid.from_bounds([-0.1] * 3, [0.1] * 3, (1, 1, 1)), BakeSettings(keep_all=True, samples=4), capture
-    )
-    hit = stages.surfaces().triangle[0] >= 0
-    assert hit.sum() > 500
-    assert (np.abs(stages.source()[0][hit] * np.pi / 2.4 - 1).max(axis=1) < 1e-4).mean() > 0.995
+    stages = Stages(snapshot, Grid.from_bounds([-0.1] * 3, [0.1] * 3, (1, 1, 1)), BakeSettings(keep_all=True), capture)
+    direct = stages.direct()
+    assert len(direct) > 100 and (stages.patch() >= 0).sum() > 500
+    # normals of patches are rounded to steps of 1/2047
+    assert (np.abs(direct / 2.4 - 1).max(axis=1) < (5e-4 if slanted else 1e-5)).mean() > 0.995
 
 
 def test_the_probe_above_a_lit_plane():
@@ -211,7 +194,7 @@ def pillars(seed=0):
     )
 
 
-def soup(count=3000, seed=1):
+def soup(count=2000, seed=1):
     """Thousands of triangles in the open, more than one cluster of the layered pass."""
     generator = np.random.default_rng(seed)
     corners = generator.uniform(-2, 2, (count, 1, 3)) + generator.normal(0, 0.05, (count, 3, 3))
@@ -236,11 +219,8 @@ def test_captures_agree(name):
     drawn = stages.surfaces()
     same = traced.triangle == drawn.triangle
     both = np.isfinite(traced.distance) & np.isfinite(drawn.distance)
-    near = np.where(
-        both,
-        np.abs(traced.distance - drawn.distance) < 1e-3 * np.where(both, traced.distance, 1),
-        ~np.isfinite(traced.distance) & ~np.isfinite(drawn.distance),
-    )
+    one, other = (np.where(both, seen.distance, 1.0) for seen in (traced, drawn))
+    near = (np.abs(one - other) < 1e-3 * one) & (np.isfinite(traced.distance) == np.isfinite(drawn.distance))
     assert (same & near).mean() >= 0.995
     # The rest lies on edges: the reference's ray through the texel's centre, moved a little, finds both triangles.
     probe, texel = np.nonzero(~same)
@@ -254,7 +234,7 @@ def on_an_edge(reference, probe, texel, triangle):
     """Does the texel's ray pass close to an edge of ``triangle``, in angle?"""
     if triangle < 0:
         return False
-    corners = reference.triangles[triangle] - reference.positions[probe]
+    corners = reference.scene.triangles[triangle] - reference.positions[probe]
     corners /= np.linalg.norm(corners, axis=1, keepdims=True)
     direction = reference.directions[texel]
     steps = np.linspace(0, 1, 2001)[:, None]
@@ -267,41 +247,31 @@ def on_an_edge(reference, probe, texel, triangle):
 def test_captures_give_the_same_light(name):
     build, low, high = SCENES[name]
     grid = Grid.from_bounds(low, high, (4, 3, 3))
-    fields = [bake(build(), grid, BakeSettings(capture=capture)).field for capture in ("trace", "raster")]
+    fields = [bake(build(), grid, BakeSettings(capture=capture, bounces=2)).field for capture in ("trace", "raster")]
     np.testing.assert_array_equal(fields[0].state, fields[1].state)
     found, expected = (irradiance_at_nodes(field) for field in fields)
-    assert relative_rms(found, expected) < 5e-3
-    assert np.abs(found - expected).max() < 2e-2 * expected.max()
+    # A few patches more or less, and all draw other numbers: the two are as far apart as two seeds.
+    assert relative_rms(found, expected) < 1.2e-2
+    assert np.abs(found - expected).max() < 1e-2 * expected.max()
 
 
 @pytest.mark.parametrize("capture", ["trace", "raster"])
 def test_two_runs_give_identical_bytes(capture):
-    grid = Grid.from_bounds([-0.6, -0.5, -0.5], [0.7, 0.5, 0.4], (4, 3, 3))
-    runs = [bake(cluttered_room(), grid, BakeSettings(capture=capture)).field for _ in range(2)]
+    grid = Grid.from_bounds([-0.6, -0.5, -0.5], [0.7, 0.5, 0.4], (3, 3, 3))
+    runs = [bake(lamps_of_three_kinds(), grid, BakeSettings(capture=capture)).field for _ in range(2)]
     for name in ("coefficients", "state", "validity", "depth"):
         assert getattr(runs[0], name).tobytes() == getattr(runs[1], name).tobytes(), name
 
 
+def lamps_of_three_kinds():
+    return cluttered_room({name: all_lights()[name] for name in ("point soft", "sun wide", "ellipse")}, clutter=12)
+
+
 def test_another_seed_gives_other_bytes_but_the_same_light():
     grid = Grid.from_bounds([-0.6, -0.5, -0.5], [0.7, 0.5, 0.4], (3, 3, 3))
-    one, two = (bake(cluttered_room(), grid, BakeSettings(seed=seed, samples=16)).field for seed in (0, 1))
+    one, two = (bake(lamps_of_three_kinds(), grid, BakeSettings(seed=seed)).field for seed in (0, 1))
     assert one.coefficients.tobytes() != two.coefficients.tobytes()
     assert relative_rms(irradiance_at_nodes(one), irradiance_at_nodes(two)) < 1e-2
-
-
-@pytest.mark.parametrize("capture", ["trace", "raster"])
-def test_a_small_memory_budget_changes_nothing(capture):
-    """Texel surfaces that do not fit are captured again in every iteration; light is the same to rounding."""
-    grid = Grid.from_bounds([-0.6, -0.5, -0.5], [0.7, 0.5, 0.4], (6, 6, 6))
-    room = cluttered_room({"point": all_lights()["point"]})
-    settings = BakeSettings(capture=capture, face=16, keep_all=True, bounces=2)
-    large, small = bake(room, grid, settings), bake(room, grid, replace(settings, memory_mib=16))
-    assert not any("memory budget" in note for note in large.notes)
-    assert any("memory budget" in note for note in small.notes)
-    np.testing.assert_allclose(
-        small.field.coefficients, large.field.coefficients, atol=1e-6 * large.field.coefficients.max()
-    )
-    np.testing.assert_array_equal(small.field.state, large.field.state)
 
 
 # Invariance
@@ -342,7 +312,7 @@ def test_a_rotated_volume_is_a_rotated_scene():
     turn = np.eye(4)
     turn[:3, :3], turn[:3, 3] = rotation, (3, 4, 5)
     grid = room_grid((3, 3, 3))
-    settings = BakeSettings(face=32, samples=8)
+    settings = BakeSettings(face=32)
     straight, turned = (
         bake(pillars(), grid, settings),
         bake(moved(pillars(), turn), Grid(turn @ grid.matrix, grid.resolution), settings),
@@ -373,5 +343,5 @@ def test_light_adds_up():
         bake(replace(snapshot, lights=chosen), grid, BakeSettings(bounces=3)).field.coefficients
         for chosen in (lamps, lamps[:1], lamps[1:])
     ]
-    # irradiance is clamped at zero where its series rings: light adds up to that
+    # how many samples a patch takes depends on how uneven its light is: all that is left between the two
     np.testing.assert_allclose(fields[0], fields[1] + fields[2], atol=2e-3 * np.abs(fields[0]).max())

@@ -203,22 +203,17 @@ def test_bounces(lit):
     direct = lit.direct()
     seen = np.where(lit.light.patches.seen, 1.0, 1e-6)
     last, before = np.zeros_like(direct), np.zeros_like(direct)
+    scale = 1.0 / (direct + made.brought).max()  # of the sums of squares
     for index in range(4):
         expected = bounce(direct, made.brought, made.reflected, made.ends, last) if index else direct
         found, sums = lit.iterate(index > 0)
         assert np.abs(found - expected).max() <= 1e-5 * expected.max()
         change, change_before = found - last, last - before
-        np.testing.assert_allclose(
-            sums,
-            [
-                seen @ (found**2).sum(axis=1),
-                seen @ (change**2).sum(axis=1),
-                seen @ (change * change_before).sum(axis=1),
-                seen @ (found @ LUMINANCE),
-            ],
-            rtol=1e-3,
-            atol=1e-5 * (found**2).sum(),
-        )
+        squares = [
+            seen @ (one * other).sum(axis=1) for one, other in ((found,) * 2, (change,) * 2, (change, change_before))
+        ]
+        np.testing.assert_allclose(sums[:3], np.array(squares) * scale**2, rtol=1e-3, atol=1e-5 * squares[0] * scale**2)
+        assert sums[3] == pytest.approx(seen @ (found @ LUMINANCE), rel=1e-4)
         before, last = last, found
     lit.light.extrapolate(3.0)
     np.testing.assert_allclose(lit.iterate(True)[0], bounce_of(lit, last + 3 * (last - before)), rtol=1e-4, atol=1e-5)

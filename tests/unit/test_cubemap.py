@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 from gridlight.core import cubemap
-from gridlight.core.conventions import FACE_FORWARD, FACE_RIGHT, FACE_UP
+from gridlight.core.conventions import CUBE_TURN, FACE_FORWARD, FACE_RIGHT, FACE_UP
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -34,7 +34,15 @@ def test_solid_angles_against_the_projected_area():
 
 def test_faces_are_what_a_camera_sees():
     """right × up points back at the viewer, so that images are not mirrored."""
-    np.testing.assert_array_equal(np.cross(FACE_RIGHT, FACE_UP), -FACE_FORWARD)
+    np.testing.assert_allclose(np.cross(FACE_RIGHT, FACE_UP), -FACE_FORWARD, atol=1e-15)
+
+
+def test_the_turn_of_cubes_is_a_rotation():
+    np.testing.assert_allclose(CUBE_TURN @ CUBE_TURN.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(CUBE_TURN) == pytest.approx(1, rel=1e-15)
+    turned = CUBE_TURN @ np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1.0]]).T
+    np.testing.assert_allclose(np.stack([FACE_FORWARD[0], FACE_FORWARD[2], FACE_FORWARD[4]], axis=1), turned)
+    assert np.abs(CUBE_TURN).max() < 0.9, "askew: no axis of the cube is near one of the world"
 
 
 def test_layout_of_a_face():
@@ -53,16 +61,6 @@ def test_texels_and_directions_are_inverses(face):
     expected = np.meshgrid(np.arange(6), np.arange(face), np.arange(face), indexing="ij")
     for found, index in zip(cubemap.direction_to_texel(cubemap.texel_directions(face), face), expected):
         np.testing.assert_array_equal(found, index)
-
-
-def test_places_of_texels():
-    centres = cubemap.texel_place_directions(np.arange(6 * 25), np.full((150, 2), 0.5), 5)
-    np.testing.assert_allclose(centres, cubemap.texel_directions(5).reshape(-1, 3), atol=1e-15)
-    inside = np.random.default_rng(0).uniform(0.01, 0.99, (150, 2))
-    face, row, column = cubemap.direction_to_texel(cubemap.texel_place_directions(np.arange(150), inside, 5), 5)
-    np.testing.assert_array_equal((face * 5 + row) * 5 + column, np.arange(150))
-    right = cubemap.texel_place_directions(np.array([0]), np.array([[1.0, 0.5]]), 1)
-    np.testing.assert_allclose(right, [[np.sqrt(0.5), -np.sqrt(0.5), 0]], atol=1e-15)
 
 
 @given(component, component, component)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from gridlight.core import lookup
 from gridlight.core.grid import Grid
+from gridlight.core.panorama import panorama_directions, panorama_solid_angles
 from gridlight.core.reference_bake import ReferenceBake, bake
 from gridlight.core.settings import BakeSettings
 from gridlight.core.snapshot import Image, Light, Material, SceneSnapshot, World
@@ -44,18 +45,18 @@ def irradiance_at_nodes(field):
     return lookup.irradiance(field, points, np.tile(NORMALS, (field.grid.count, 1)))
 
 
-GRID = Grid.from_bounds([-0.8] * 3, [0.8] * 3, (2, 2, 3))
+GRID = Grid.from_bounds([-0.8, -0.79, -0.81], [0.8, 0.78, 0.77], (2, 2, 3))
 
 
 @pytest.mark.parametrize("inward", [False, True])
-@pytest.mark.parametrize("albedo,bounces", [(0.0, 0), (0.5, 14), (0.5, 2)])
-def test_furnace(albedo, bounces, inward):
-    """Emission 1 and albedo a: radiance Σ aⁱ, whichever way the normals point."""
+@pytest.mark.parametrize("albedo,bounces,gather", [(0.0, 0, 0), (0.5, 14, 0), (0.5, 2, 0), (0.7, 1, 2)])
+def test_furnace(albedo, bounces, gather, inward):
+    """Emission 1 and albedo a: radiance Σ aⁱ, whichever way the normals point; a gather adds its segments."""
     snapshot = room(Material("m", (albedo,) * 3, emission=(1.0, 1.0, 1.0)), inward=inward)
-    field = bake(snapshot, GRID, BakeSettings(bounces=bounces, face=8))
+    field = bake(snapshot, GRID, BakeSettings(bounces=bounces, face=4, gather=gather))
     assert (field.state == 1).all()
-    expected = np.pi * sum(albedo**i for i in range(bounces + 1))
-    np.testing.assert_allclose(irradiance_at_nodes(field), expected, rtol=5e-3)
+    expected = np.pi * sum(albedo**i for i in range(bounces + gather + 1))
+    np.testing.assert_allclose(irradiance_at_nodes(field), expected, rtol=1e-9)
 
 
 def test_uniform_world_and_nothing_in_reach():
@@ -66,26 +67,53 @@ def test_uniform_world_and_nothing_in_reach():
 
 
 def test_a_point_light_in_a_room_by_hand():
-    """Outgoing radiance of every texel is a/π · I cos θ / d² of the wall it sees."""
+    """Every patch gets the mean of I cos θ / d² over its points, and texels reflect albedo/π of that."""
     position = np.array([0.3, -0.2, 0.1])
     matrix = np.eye(4)
     matrix[:3, 3] = position
     snapshot = room(Material("m", (0.5, 0.25, 1.0)), [Light("lamp", "POINT", (1.0, 1.0, 2.0), matrix)])
-    job = ReferenceBake(snapshot, GRID, BakeSettings(face=6, samples=1))
+    job = ReferenceBake(snapshot, GRID, BakeSettings(face=6))
     surfaces = job.capture()
-    points = job.points(surfaces)
-    assert np.abs(points).max(axis=2) == pytest.approx(1, rel=1e-12), "every texel sees a wall"
-    normals = -np.where(np.arange(3) == np.abs(points).argmax(axis=2)[..., None], np.sign(points), 0)
-    np.testing.assert_allclose(np.abs(surfaces.normal).sum(axis=2), 1, rtol=1e-6)
-    in_a_corner = np.sort(np.abs(points), axis=2)[..., 1] > 1 - 1e-9  # either wall may be hit there
-    normals = np.where(in_a_corner[..., None], surfaces.normal, normals)
+    assert np.abs(job.points(surfaces) + GRID.center).max(axis=2) == pytest.approx(1, rel=1e-12), "a wall everywhere"
+    patch = job.bind(surfaces)
+    job.light.light_new_patches()
+    points = job.light.patches.points[..., :3] + GRID.center
+    normals = -np.sign(points) * (np.abs(points) > 1 - 1e-4)
+    in_one_plane = (np.abs(normals).sum(axis=2) == 1).all(axis=1)
+    assert in_one_plane.mean() > 0.95
     to_light = position - points
-    distance = np.linalg.norm(to_light, axis=2)
-    expected = np.einsum("pxi,pxi->px", to_light, normals) / distance**3
-    np.testing.assert_allclose(
-        job.source(surfaces), expected[..., None] * np.array([0.5, 0.25, 2.0]) / np.pi, rtol=1e-6
+    expected = (np.einsum("npi,npi->np", to_light, normals) / np.linalg.norm(to_light, axis=2) ** 3).mean(axis=1)
+    found = job.light.direct[in_one_plane]
+    np.testing.assert_allclose(found, expected[in_one_plane, None] * [1.0, 1.0, 2.0], rtol=1e-4)
+    reflected = job.reflected(surfaces, patch, job.light.direct)
+    np.testing.assert_allclose(reflected, job.light.direct[patch] * np.array([0.5, 0.25, 1.0]) / np.pi, rtol=1e-12)
+
+
+def test_a_sun_of_the_world_lights_like_a_lamp():
+    """A floor under a black sky with one bright spot: E = ∫ L cos θ dω of the map, found without luck."""
+    sky = np.zeros((64, 128, 3), np.float32)
+    sky[45:47, 60:62] = 500.0
+    directions, solid_angles = panorama_directions(128, 64), panorama_solid_angles(128, 64)
+    expected = (sky[..., 0] * solid_angles * np.maximum(directions[..., 2], 0)).sum()
+    assert expected > 0, "rows above the middle lie above the horizon"
+    floor = np.array([[-50, -50, -1], [50, -50, -1], [50, 50, -1], [-50, 50, -1]], float)
+    snapshot = SceneSnapshot(
+        floor,
+        np.array([[0, 1, 2], [0, 2, 3]], np.int32),
+        np.tile(np.array([0, 0, 1], np.float32), (2, 3, 1)),
+        np.zeros((2, 3, 2), np.float32),
+        np.zeros(2, np.int32),
+        np.zeros(2, np.int32),
+        ["floor"],
+        [Material("m")],
+        [],
+        [],
+        World(map=sky),
     )
-    np.testing.assert_allclose(surfaces.normal, normals, atol=1e-7)
+    job = ReferenceBake(snapshot, Grid.from_bounds([-0.5] * 3, [0.5] * 3, (1, 1, 1)), BakeSettings(face=6))
+    job.bind(job.capture())
+    job.light.light_new_patches()
+    np.testing.assert_allclose(job.light.direct[:, 0], expected, rtol=0.02)
 
 
 def test_textures_holes_and_emission():
@@ -125,7 +153,9 @@ def test_probes_in_a_solid_are_invalid():
     grid = Grid.from_bounds([-0.8] * 3, [0.8] * 3, (3, 3, 3))
     job = ReferenceBake(both, grid, BakeSettings(face=8))
     surfaces = job.capture()
-    source = job.source(surfaces)
-    assert not job.shells(surfaces, source).any()
-    state = job.field_statistics(surfaces, source).state
+    patch = job.bind(surfaces)
+    job.light.light_new_patches()
+    reflected = job.reflected(surfaces, patch, job.light.direct)
+    assert not job.shells(surfaces, reflected).any()
+    state = job.field_statistics(surfaces, reflected).state
     assert state[13] == 2 and (np.delete(state, 13) == 1).all()
