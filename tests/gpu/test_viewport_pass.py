@@ -76,6 +76,7 @@ def random_field(seed=0, centre=(0.0, 0.0, 0.0), bands=3):
     count = field.grid.count
     field.coefficients[:] = generator.normal(0, 0.2, field.coefficients.shape)
     field.coefficients[:, 0] = generator.uniform(1.0, 3.0, (count, 3))
+    field.gradient[:] = generator.normal(0, 0.1, field.gradient.shape)
     field.state[:] = generator.choice([ACTIVE, ACTIVE, ACTIVE, CULLED, INVALID], count)
     field.offset[:] = generator.uniform(-0.1, 0.1, (count, 3))
     mean = generator.uniform(0.2, 3.0, (count, DEPTH_EDGE**2))
@@ -311,7 +312,9 @@ def test_traced_and_rasterised_pictures_are_the_same():
     grid = Grid.from_bounds((-1.5, -1.2, -1.0), (1.4, 1.3, 1.1), (4, 4, 3))
     field = random_field(9)
     field = Field(
-        grid, *(getattr(field, name)[: grid.count] for name in ("coefficients", "state", "validity", "offset", "depth"))
+        grid,
+        *(getattr(field, name)[: grid.count] for name in ("coefficients", "state", "validity", "offset", "depth")),
+        gradient=field.gradient[: grid.count],
     )
     camera = look((-1.3, -1.0, 0.6), (0.5, 0.4, -0.3), ASPECT, 0.7)
     textures = SceneTextures(snapshot, grid.center, sampling_density(snapshot, grid))
