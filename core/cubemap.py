@@ -26,16 +26,6 @@ def texel_directions(face: int) -> np.ndarray:
     return directions / np.linalg.norm(directions, axis=-1, keepdims=True)
 
 
-def texel_place_directions(texels: np.ndarray, places: np.ndarray, face: int) -> np.ndarray:
-    """(N, 3) unit directions through ``places`` (N, 2; column, row in 0..1) of ``texels`` (N,), counted face by face,
-    row by row."""
-    index, rest = np.divmod(texels, face * face)
-    row, column = np.divmod(rest, face)
-    s, t = (np.stack([column, row]) + np.asarray(places, float).T) * 2.0 / face - 1.0
-    directions = FACE_FORWARD[index] + s[:, None] * FACE_RIGHT[index] + t[:, None] * FACE_UP[index]
-    return directions / np.linalg.norm(directions, axis=-1, keepdims=True)
-
-
 def texel_solid_angles(face: int) -> np.ndarray:
     """(face, face) exact solid angles of one face's texels, steradian; six faces sum to 4π to rounding.
 
