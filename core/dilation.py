@@ -33,23 +33,6 @@ def fill(grid: Grid, coefficients: np.ndarray, active: np.ndarray) -> np.ndarray
     return filled.astype(coefficients.dtype)
 
 
-def nearest_active(grid: Grid, active: np.ndarray) -> np.ndarray:
-    """(P,) index of an active node near each node (itself where active), found in steps along the axes.
-
-    Needs at least one active node.
-    """
-    nearest = np.where(active, np.arange(grid.count), -1)
-    missing = np.flatnonzero(~active)
-    neighbours = _neighbours(grid, missing)
-    while len(missing):
-        candidates = np.where(neighbours >= 0, nearest[neighbours], -1)
-        found = candidates.max(axis=1)
-        nearest[missing] = found
-        open_ = found < 0
-        missing, neighbours = missing[open_], neighbours[open_]
-    return nearest
-
-
 def _neighbours(grid: Grid, nodes: np.ndarray) -> np.ndarray:
     """(N, 6) flat indices of the nodes one step along each axis, −1 past the edge."""
     resolution = np.array(grid.resolution)

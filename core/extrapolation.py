@@ -14,8 +14,8 @@ def reduced_rank(states: np.ndarray) -> np.ndarray | None:
 
     Reduced rank extrapolation (Eddy 1979; Mesina 1977; Sidi, "Vector Extrapolation Methods", 2017, ch. 2): of all
     combinations Σ γₖ xₖ with Σ γₖ = 1 the one whose next change would be smallest, which for a linear iteration is
-    Σ γₖ (xₖ₊₁ − xₖ); equivalent to GMRES. Many slow modes, such as cupboards that fill with light at a pace of their own
-    each, are found together.
+    Σ γₖ (xₖ₊₁ − xₖ); equivalent to GMRES. Many slow modes, such as cupboards that fill with light at a pace of
+    their own each, are found together.
     """
     changes = states[:-1] - states[1:]
     count = len(changes)

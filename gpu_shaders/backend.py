@@ -40,6 +40,7 @@ _SURFACE_FORMATS = {
 }
 BYTES_PER_TEXEL = 16 * len(_SURFACE_FORMATS)
 _GATHER_RAYS = 1 << 20  # at once
+_TEXELS_AT_ONCE = 1 << 19  # that are bound to patches; their surfaces take 24 MiB
 _HIT_BYTES = 20  # hit record and depth, which exist during capture only
 
 
@@ -81,7 +82,10 @@ class GpuBackend:
         texels = 6 * self.face**2
         budget = settings.memory_mib << 20
         self._probes_per_capture = max(1, min(layer_limit // 6, budget // 4 // (texels * _HIT_BYTES)))
-        self.probes_per_batch = max(1, min(layer_limit, budget // (texels * BYTES_PER_TEXEL)))
+        # Patches are found portion by portion, the same in every batch size: the memory budget changes no byte.
+        self._portion = min(layer_limit, max(1, _TEXELS_AT_ONCE // texels))
+        fitting = max(1, min(layer_limit, budget // (texels * BYTES_PER_TEXEL)))
+        self.probes_per_batch = max(fitting // self._portion, 1) * self._portion
         self.probes_in_budget = max(1, budget // (texels * BYTES_PER_TEXEL))
         self._hits = None
         self._raster = None
@@ -246,7 +250,14 @@ class GpuBackend:
 
     def bind(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> None:
         """Finds the patches on which the texels of all or of ``count`` probes from ``start`` lie."""
-        count = surfaces.count if count is None else count
+        first = surfaces.first + start
+        stop = surfaces.first + surfaces.count if count is None else first + count
+        while first < stop:
+            end = min(stop, (first // self._portion + 1) * self._portion)
+            self._bind_portion(surfaces, first - surfaces.first, end - first)
+            first = end
+
+    def _bind_portion(self, surfaces: Surfaces, start: int, count: int) -> None:
         first = surfaces.first + start
         patches = self.light.bind_texels(
             self._texel_hits(surfaces, start, count), self._positions[first : first + count]

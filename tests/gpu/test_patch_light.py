@@ -237,12 +237,11 @@ def test_a_moved_probe_is_a_probe_of_its_new_place():
 
 @pytest.mark.parametrize("capture", ["trace", "raster"])
 def test_a_small_memory_budget(capture):
-    """Texel surfaces that do not fit are captured again whenever they are needed: exactly the same in a furnace, and as
-    close as another seed elsewhere, because patches are founded in the order in which probes come."""
-    grid = Grid.from_bounds([-0.91, -0.88, -0.93], [0.92, 0.89, 0.87], (6, 6, 7))
+    """Texel surfaces that do not fit are captured again whenever they are needed, and give the same bytes."""
+    grid = Grid.from_bounds([-0.91, -0.88, -0.93], [0.92, 0.89, 0.87], (5, 5, 7))
     lamp = Light("lamp", "POINT", (1.0, 2.0, 3.0), frame((0.3, 0.2, 0.5)))
     grey = snapshot_of(box()[:, ::-1], materials=[Material("grey", (0.5, 0.5, 0.5))], lights=[lamp])
-    settings = BakeSettings(capture=capture, keep_all=True, bounces=2)
+    settings = BakeSettings(capture=capture, keep_all=True, bounces=2, face=32)  # 85 probes are bound at once
     small = replace(settings, memory_mib=16)
     note = "memory budget"
     result = bake(furnace(0.5), grid, small)
@@ -251,4 +250,4 @@ def test_a_small_memory_budget(capture):
     large, small = bake(grey, grid, settings), bake(grey, grid, small)
     assert not any(note in text for text in large.notes)
     np.testing.assert_array_equal(small.field.state, large.field.state)
-    assert relative_rms(irradiance_at_nodes(small.field), irradiance_at_nodes(large.field)) < 5e-3
+    np.testing.assert_array_equal(small.field.coefficients, large.field.coefficients)

@@ -49,15 +49,3 @@ def test_one_active_probe_fills_all():
 def test_nothing_active_changes_nothing():
     coefficients = np.ones((5, 1, 3))
     assert (dilation.fill(line(5), coefficients, np.zeros(5, bool)) == coefficients).all()
-
-
-def test_nearest_active():
-    grid = Grid.from_bounds([0] * 3, [1] * 3, (5, 4, 3))
-    active = np.zeros(60, bool)
-    active[[0, 59]] = True
-    nearest = dilation.nearest_active(grid, active)
-    lattice = grid.lattice()
-    steps = np.abs(lattice[:, None] - lattice[[0, 59]]).sum(axis=2)
-    chosen = np.abs(lattice - lattice[nearest]).sum(axis=1)
-    assert set(nearest) == {0, 59}
-    np.testing.assert_array_equal(chosen, steps.min(axis=1))
