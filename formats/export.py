@@ -24,6 +24,7 @@ from ..core import dilation, ringing, windowing
 from ..core.conventions import ACTIVE, CULLED, INVALID, MAX_BANDS
 from ..core.errors import InputError
 from ..core.field import Field
+from ..core.gradients import gradient_bands
 from . import (
     export_bevy,
     export_cubemap,
@@ -187,6 +188,7 @@ def prepare(source: Field, options: ExportOptions, most_bands: int) -> tuple[Fie
     if bands > most_bands:
         raise InputError(f"--bands {bands}: this format holds {most_bands} at most")
     coefficients = source.coefficients[:, : bands * bands].astype(np.float32)
+    gradient = source.gradient[:, :, : gradient_bands(bands) ** 2]
     active = source.state == ACTIVE
     filled = False
     if options.inactive == "zero":
@@ -195,10 +197,16 @@ def prepare(source: Field, options: ExportOptions, most_bands: int) -> tuple[Fie
         coefficients = dilation.fill(source.grid, coefficients, active)
         filled = True
     if options.window == "auto":
-        coefficients = ringing.dering(coefficients).coefficients
-    coefficients = windowing.apply(coefficients, options.gain * window_factors(options.window, bands))
-    coefficients = coefficients.astype(np.float32)
-    prepared = Field(source.grid, coefficients, source.state, source.validity, source.offset, source.depth)
+        window = ringing.dering(coefficients)
+        coefficients = window.coefficients
+        gradient = gradient * ringing.band_factors(window.factors, gradient_bands(bands))[:, None, :, None]
+    factors = options.gain * window_factors(options.window, bands)
+    coefficients = windowing.apply(coefficients, factors).astype(np.float32)
+    along = gradient.reshape(-1, *gradient.shape[2:])
+    gradient = windowing.apply(along, factors[: gradient_bands(bands)]).reshape(gradient.shape).astype(np.float32)
+    prepared = Field(
+        source.grid, coefficients, source.state, source.validity, source.offset, source.depth, gradient=gradient
+    )
     return prepared, filled
 
 

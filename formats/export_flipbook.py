@@ -21,7 +21,7 @@ AXES, PRECISION, BANDS, SUFFIX = "y-up", "half", 4, ".exr"
 ENGINE = "any that reads EXR"
 STORED = "radiance coefficients, orthonormal"
 RUN_IN_ENGINE = False
-DOES_NOT_CARRY = ["visibility weights", "culled and invalid told apart: alpha is 0 for both"]
+DOES_NOT_CARRY = ["visibility weights", "gradients of probes", "culled and invalid told apart: alpha is 0 for both"]
 
 
 def write(job) -> dict:

@@ -12,7 +12,7 @@ AXES, PRECISION, BANDS, SUFFIX = "blender", "float", 4, ".json"
 ENGINE = "any"
 STORED = "radiance coefficients, orthonormal; multiply band l by pi, 2pi/3, pi/4, 0 for irradiance"
 RUN_IN_ENGINE = False
-DOES_NOT_CARRY = ["visibility weights (depth statistics stay in the probe file)"]
+DOES_NOT_CARRY = ["visibility weights and gradients of probes (they stay in the probe file)"]
 
 
 def write(job) -> dict:

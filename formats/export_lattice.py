@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Probes on their way to an engine: another space, other axes, only what the target can take.
 
-A ``Lattice`` is a field without what no engine reads. Engines want its box along their axes (three.js), turned but not
-mirrored (Bevy), or take any positions (Godot, Unity); ``axis_aligned``, ``right_handed`` and ``thickened`` bring it
-there. All of them keep light where it is: they reorder nodes, or resample where reordering cannot do it.
+A ``Lattice`` is a field without what no engine reads; its gradients are kept for resampling alone. Engines want its box
+along their axes (three.js), turned but not mirrored (Bevy), or take any positions (Godot, Unity); ``axis_aligned``,
+``right_handed`` and ``thickened`` bring it there. All of them keep light where it is: they reorder nodes, or resample
+where reordering cannot do it.
 """
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.field import Field
+from ..core.gradients import per_cell
 from ..core.grid import Grid
-from ..core.lookup import trilinear
+from ..core.lookup import gradient_steps, trilinear
 from ..core.settings import MAX_RESOLUTION
 from ..core.sh_rotation import rotate
 
@@ -37,6 +39,7 @@ class Lattice:
     grid: Grid
     coefficients: np.ndarray  # (P, bands², 3) float32 radiance
     state: np.ndarray  # (P,) uint8
+    steps: np.ndarray | None = None  # (P, 3, K, 3) change over a cell along the grid's axes; none after resampling
 
     @property
     def bands(self) -> int:
@@ -48,7 +51,7 @@ class Resampling:
     """What it cost to bring a rotated volume onto straight axes."""
 
     resolution: tuple[int, int, int]
-    relative_rms: float  # of radiance coefficients, trilinear before against trilinear after, inside the volume
+    relative_rms: float  # of radiance coefficients, looked up before and trilinear after, inside the volume
 
 
 def axes_matrix(name: str) -> np.ndarray:
@@ -76,8 +79,11 @@ def converted(field: Field, axes: np.ndarray, scale: float) -> Lattice:
     matrix[:3] = scale * (axes @ matrix[:3])
     grid = Grid(matrix, field.grid.resolution, field.grid.name)
     turned = not np.array_equal(axes, np.eye(3))
-    coefficients = rotate(field.coefficients, axes) if turned else field.coefficients
-    return Lattice(grid, coefficients.astype(np.float32), field.state)
+    coefficients, steps = field.coefficients, per_cell(field.grid, field.gradient)
+    if turned:
+        coefficients = rotate(coefficients, axes)
+        steps = rotate(steps, axes)
+    return Lattice(grid, coefficients.astype(np.float32), field.state, steps)
 
 
 def reordered(lattice: Lattice, order: tuple[int, int, int], flips: tuple[bool, bool, bool]) -> Lattice:
@@ -90,7 +96,9 @@ def reordered(lattice: Lattice, order: tuple[int, int, int], flips: tuple[bool, 
     nodes = np.arange(lattice.grid.count).reshape(lattice.grid.resolution[::-1])  # [k, j, i]
     nodes = nodes.transpose([2 - order[axis] for axis in (2, 1, 0)])
     nodes = nodes[tuple(slice(None, None, -1 if flips[axis] else 1) for axis in (2, 1, 0))].ravel()
-    return Lattice(Grid(matrix, resolution, lattice.grid.name), lattice.coefficients[nodes], lattice.state[nodes])
+    grid = Grid(matrix, resolution, lattice.grid.name)
+    steps = None if lattice.steps is None else lattice.steps[nodes][:, list(order)] * signs[:, None, None]
+    return Lattice(grid, lattice.coefficients[nodes], lattice.state[nodes], steps)
 
 
 def nearest_axes(lattice: Lattice) -> Lattice:
@@ -123,7 +131,8 @@ def axis_aligned(lattice: Lattice, refine: int = 1) -> tuple[Lattice, Resampling
 
     The resampled box is the smallest that holds all nodes. A step along any of its axes crosses at most one cell of the
     old grid, so no node's light is lost. With ``refine`` N cells are cut into N³, and the box grows so that it holds
-    half an old cell around the outermost nodes still; trilinear light stays what it was.
+    half an old cell around the outermost nodes still. Light between the old nodes is what a lookup finds there, but for
+    walls: gradients count.
 
     Raises:
         InputError: that needs too many nodes along an axis.
@@ -147,7 +156,7 @@ def axis_aligned(lattice: Lattice, refine: int = 1) -> tuple[Lattice, Resampling
     grid = Grid.from_bounds(old.center - half, old.center + half, _counted(old, steps * refine + 1 + 2 * border))
     nodes, weights = trilinear(old, grid.positions())
     strongest = nodes[np.arange(grid.count), weights.argmax(axis=1)]
-    result = Lattice(grid, blend(near.coefficients, nodes, weights), near.state[strongest])
+    result = Lattice(grid, _looked_up(near, grid.positions()), near.state[strongest])
     return result, None if straight else Resampling(grid.resolution, _difference(near, result))
 
 
@@ -160,11 +169,17 @@ def _counted(old: Grid, counts: np.ndarray) -> np.ndarray:
     return counts
 
 
-def blend(coefficients: np.ndarray, nodes: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """(N, K, 3) float32 of ``coefficients`` (P, K, 3) at ``nodes`` (N, 8) by ``weights`` (N, 8)."""
-    result = np.zeros((len(nodes), *coefficients.shape[1:]), np.float32)
+def _looked_up(lattice: Lattice, points: np.ndarray) -> np.ndarray:
+    """(N, K, 3) float32 coefficients of ``lattice`` at ``points`` (N, 3) in its space."""
+    nodes, weights = trilinear(lattice.grid, points)
+    steps = gradient_steps(lattice.grid, points, weights) * weights[..., None]
+    result = np.zeros((len(nodes), *lattice.coefficients.shape[1:]), np.float32)
     for corner in range(nodes.shape[1]):
-        result += coefficients[nodes[:, corner]] * weights[:, corner, None, None].astype(np.float32)
+        node = nodes[:, corner]
+        result += lattice.coefficients[node] * weights[:, corner, None, None].astype(np.float32)
+        if lattice.steps is not None:
+            led = np.einsum("na,nakc->nkc", steps[:, corner], lattice.steps[node])
+            result[:, : led.shape[1]] += led.astype(np.float32)
     return result
 
 
@@ -176,7 +191,8 @@ def thickened(lattice: Lattice) -> Lattice:
             nodes = np.arange(lattice.grid.count).reshape(lattice.grid.resolution[::-1])
             nodes = np.repeat(nodes, 2, axis=2 - axis).ravel()
             grid = replace(lattice.grid, resolution=resolution)
-            lattice = Lattice(grid, lattice.coefficients[nodes], lattice.state[nodes])
+            steps = None if lattice.steps is None else lattice.steps[nodes]
+            lattice = Lattice(grid, lattice.coefficients[nodes], lattice.state[nodes], steps)
     return lattice
 
 
@@ -196,7 +212,6 @@ def _difference(before: Lattice, after: Lattice) -> float:
     counts = np.array(before.grid.resolution)
     places *= counts > 1  # along an axis with one node the light is the same everywhere
     points = places @ before.grid.matrix[:3, :3].T + before.grid.matrix[:3, 3]
-    first = blend(before.coefficients, *trilinear(before.grid, points))
-    second = blend(after.coefficients, *trilinear(after.grid, points))
+    first, second = _looked_up(before, points), _looked_up(after, points)
     scale = float(np.sqrt(np.mean(first**2)))
     return float(np.sqrt(np.mean((first - second) ** 2))) / scale if scale else 0.0

@@ -6,12 +6,14 @@ floats' accuracy. tests/web runs the same in the real engine.
 """
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from export_fields import PLACEMENTS, STRAIGHT, Y_UP, lit_field, places_inside, sample_volume
 from gridlight.core import lookup
-from gridlight.formats.export import ExportOptions, export
+from gridlight.core.windowing import apply
+from gridlight.formats.export import ExportOptions, export, window_factors
 
 HALF = 2.0**-10
 
@@ -126,6 +128,29 @@ def test_refined_it_looks_closer_to_the_surface(tmp_path, placement, refine):
     inside = (found != 0).any(axis=1)
     np.testing.assert_allclose(found[inside], expected[inside], rtol=1e-5)
     assert inside.sum() > 200 or refine == 3
+
+
+@pytest.mark.parametrize("placement", PLACEMENTS)
+@pytest.mark.parametrize("window", ["none", "hann:4"])
+def test_refined_it_follows_gradients(tmp_path, placement, window):
+    """Cells of an eighth hold what eval finds between probes, and up to half a cell past them."""
+    field = lit_field(*PLACEMENTS[placement], linear=False)
+    field.gradient[:] = np.random.default_rng(6).normal(0, 1.0, field.gradient.shape)
+    plain = replace(field, gradient=None)
+    _result, probes = exported(field, tmp_path, precision="float", refine=8, window=window)
+    factors = window_factors(window, 3)
+    field.coefficients = apply(field.coefficients, factors).astype(np.float32)
+    field.gradient = apply(field.gradient.reshape(-1, 9, 3), factors).reshape(field.gradient.shape)
+    points, normals = places_inside(field.grid, 400, share=1.05)
+    looked_at = points + normals @ Y_UP.T * probes.spacing * 0.5 @ Y_UP
+    expected = lookup.irradiance(field, looked_at, normals)
+    found = probes.irradiance(points @ Y_UP.T, normals @ Y_UP.T)
+    within = (found != 0).any(axis=1)
+    plain.coefficients = field.coefficients
+    without = lookup.irradiance(plain, looked_at, normals)
+    assert within.sum() > 300
+    error, missing = (np.sqrt(np.mean((values - expected)[within] ** 2)) for values in (found, without))
+    assert error < (0.1 if placement in STRAIGHT else 0.25) * missing
 
 
 def test_bright_sides_are_where_blender_has_them(tmp_path):
