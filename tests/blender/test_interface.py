@@ -121,9 +121,11 @@ def test_bake_is_in_the_file_after_saving_and_loading(room, gpu_context, tmp_pat
     bpy.ops.wm.read_homefile(use_empty=True)
     bpy.ops.wm.open_mainfile(filepath=path)
     again = load_field(bpy.data.objects["Room"])
-    for name in ("coefficients", "state", "validity", "offset", "depth"):
+    for name in ("coefficients", "state", "validity", "offset", "depth", "gradient"):
         assert np.array_equal(getattr(again, name), getattr(baked, name)), name
-    assert again.metadata == baked.metadata
+    assert again.metadata == baked.metadata and again.gradient.any()
+    del bpy.data.objects["Room"]["gridlight_field"]["gradient"]  # as it was stored before there were any
+    assert not load_field(bpy.data.objects["Room"]).gradient.any()
 
 
 def test_a_copied_volume_keeps_the_originals_light_apart(room, gpu_context):
