@@ -224,7 +224,7 @@ class PatchLight:
             bounce,
         )
         brightest = float(np.abs(self.source[:, :3]).max(initial=0.0))
-        scale = 1.0 / brightest if brightest > 0.0 else 1.0
+        scale = 1.0 / brightest if 0.0 < brightest < 1e37 else 1.0  # light that is not finite is found by its sums
         shader = program("patch_change_comp")
         for name, texture in zip(("irradiance_new", "irradiance_old", "irradiance_older"), self._irradiance):
             shader.uniform_sampler(name, texture)

@@ -216,7 +216,8 @@ def test_refitted_trees_give_the_same_answers(triangles):
 
 
 def test_cost_counts_what_a_random_ray_meets():
-    """A leaf of two triangles and one of one at the ends of a unit cube: half surfaces 3 of the root, 1 of each leaf."""
+    """A leaf of two triangles and one of one at the ends of a unit cube: half surfaces 3 of the root, 1 of each
+    leaf."""
     ends = np.array(
         [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 1, 1], [1, 0, 1]], [[0, 0, 0], [1, 1, 0], [1, 0, 0]]]
     )
