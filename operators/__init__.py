@@ -6,9 +6,9 @@ _unregister = []
 
 def _modules() -> tuple:
     """Modules with operators, in the order of registration. Imported here: the package must load without Blender."""
-    from . import bake, explore, export, gallery, place_probes, preview, report, stale, volume
+    from . import bake, explore, export, gallery, import_field, place_probes, preview, report, stale, volume
 
-    return volume, place_probes, bake, stale, gallery, preview, explore, export, report
+    return volume, place_probes, bake, stale, gallery, preview, explore, export, import_field, report
 
 
 def register():

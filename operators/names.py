@@ -21,6 +21,7 @@ PICK_PROBE = "gridlight.pick_probe"
 EXPLORE = "gridlight.explore"
 
 EXPORT = "gridlight.export"
+IMPORT = "gridlight.import_field"
 REPORT = "gridlight.report"
 
 CATEGORY = "Gridlight"  # the sidebar's tab

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from gridlight.core.grid import Grid
 from gridlight.core.settings import BakeSettings
+from gridlight.formats import probe_file
 from gridlight.scene import probe_objects
 from gridlight.scene.field_storage import load_field, stored_counts
 from gridlight.scene.volumes import create_volume
@@ -305,3 +306,24 @@ def test_the_command_line_finds_the_same_edits(room):
     assert probe_objects.edits_of(scene, grid).disabled.sum() == 1
     assert probe_objects.edits_of(scene, Grid(grid.matrix, (4, 3, 3), "Room")) is None  # --resolution was given
     assert probe_objects.edits_of(scene, Grid(grid.matrix, (3, 3, 3), "fitted volume")) is None
+
+
+def test_a_probe_file_comes_back_as_a_volume_with_its_light(room, tmp_path):
+    assert bpy.ops.gridlight.bake() == {"FINISHED"}
+    baked = load_field(room)
+    probe_file.write(tmp_path / "probes.exr", baked)
+    assert bpy.ops.gridlight.import_field(filepath=str(tmp_path / "probes.exr")) == {"FINISHED"}
+    volume = bpy.context.view_layer.objects.active
+    assert volume != room
+    field = load_field(volume)
+    np.testing.assert_allclose(field.grid.matrix, baked.grid.matrix, atol=1e-6)
+    for name in ("coefficients", "state", "offset", "depth", "gradient"):
+        np.testing.assert_array_equal(getattr(field, name), getattr(baked, name))
+
+
+def test_what_is_no_probe_file_adds_nothing(scene, tmp_path):
+    (tmp_path / "broken.exr").write_bytes(b"no picture")
+    for name in ("broken.exr", "missing.exr"):
+        with pytest.raises(RuntimeError, match=name):
+            bpy.ops.gridlight.import_field(filepath=str(tmp_path / name))
+    assert not scene.objects
