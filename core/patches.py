@@ -34,6 +34,8 @@ EMITTERS, ALL = "emitters", "all"
 Part = tuple[int, int] | str  # of the light: a range of the list of lamps and suns, EMITTERS, or ALL
 NO_PATCH, NOTHING = -1, -2  # in place of a patch: not bound; nothing to bind
 ANGLE = 0.5  # radians: most edge of a patch as a probe sees it
+_MANY_PROBES = 128  # in smaller grids probes share less, and patches are smaller in their sight
+_LEAST_ANGLE = 0.25  # of ANGLE
 _MANY = 32768  # patches whose mean is good with the plain number of rays
 _MOST_EFFORT = 256
 _UNEVEN = (0.6, 3.0)  # error of four points, of the mean light, from which on the second and third number is taken
@@ -87,6 +89,7 @@ class Patches:
             _CELL_SHARE * float(np.exp(np.log(spacing).mean())),
             float(np.linalg.norm(grid.matrix[:3, :3] * 2)) / _LEAST_CELLS,
         )
+        self._angle = ANGLE * float(np.clip(np.sqrt(grid.count / _MANY_PROBES), _LEAST_ANGLE, 1.0))
         self._to_box = np.linalg.inv(grid.matrix[:3, :3]).astype(np.float32)
         self._half = np.linalg.norm(grid.matrix[:3, :3], axis=0).astype(np.float32)
         self._keys = [np.zeros(0, np.uint64) for _ in range(_VARIANTS)]  # sorted
@@ -155,9 +158,9 @@ class Patches:
         # Columns in float32: bakes bind millions of hits, and only borders of cells move by rounding.
         position = np.ascontiguousarray(hits[:, :3].T)
         beyond = np.maximum(np.abs(self._to_box @ position) - 1, 0) * self._half[:, None]
-        wanted = np.maximum(np.float32(0.5 * ANGLE / self.cell) * np.sqrt((beyond * beyond).sum(axis=0)), 1)
+        wanted = np.maximum(np.float32(0.5 * self._angle / self.cell) * np.sqrt((beyond * beyond).sum(axis=0)), 1)
         if view_distance is not None:
-            wanted = np.minimum(wanted, np.float32(ANGLE / self.cell) * view_distance.astype(np.float32))
+            wanted = np.minimum(wanted, np.float32(self._angle / self.cell) * view_distance.astype(np.float32))
             wanted = np.maximum(wanted, np.float32(2.0**_FINEST))
         level = np.frexp(wanted)[1] - 1 + coarser  # ⌊log2⌋
         place = np.floor(position * np.ldexp(np.float32(1 / self.cell), -level) + np.float32(_SHIFT))

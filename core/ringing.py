@@ -28,6 +28,7 @@ _GOLDEN_STEPS = 10  # shrink an interval to 1/120; about the least damage the ra
 _FACTOR_HALVINGS = 17  # factors are exact to 1e-5
 _PROBES_AT_ONCE = 1 << 14
 _ROUNDING = 1e-6  # of the mean irradiance: less below zero than this is float32
+_COUNTED = 1e-5  # what is reported: windows leave as much as their factors are exact
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def ringing(coefficients: np.ndarray) -> Ringing:
         mean = _mean_irradiance(part)
         may = np.flatnonzero(_may_ring(part))
         below = _relative_minimum(part[may], mean[may])
-        rings = (below < -_ROUNDING) | (mean[may] < 0)
+        rings = (below < -_COUNTED) | (mean[may] < 0)
         negative += int(rings.any(axis=1).sum())
         lowest = min(lowest, float(below[rings].min(initial=0.0)))
     return Ringing(len(coefficients), negative, lowest)
