@@ -16,7 +16,7 @@ from .grid import Grid
 from .snapshot import SceneSnapshot
 
 PROBE_POINTS = 4096  # on emitters that each probe considers besides its texels
-PROBE_RAYS = 512  # that it sends to them
+PROBE_RAYS = 256  # that it sends to them
 _MOST_AREA_SHARE = 0.25  # of all surface: a scene that glows all over is resolved by any grid
 
 

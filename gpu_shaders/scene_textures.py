@@ -7,6 +7,7 @@ float32.
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 
 from ..core import bvh
@@ -298,8 +299,10 @@ def _pack_images(images: list[Image]) -> tuple[np.ndarray, np.ndarray]:
         rows = -(-len(texels) // ROW)
         parts.append(np.pad(texels, ((0, rows * ROW - len(texels)), (0, 0))))
         row += rows
-    # Rounded here: Blender 4.5 cuts off what does not fit a half float, which darkens every image.
-    return table, np.minimum(np.concatenate(parts), 65504.0).astype(np.float16).astype(np.float32)
+    texels = np.minimum(np.concatenate(parts), 65504.0)
+    if bpy.app.version < (5, 0):  # which cuts off what does not fit a half float, and so darkens every image
+        texels = texels.astype(np.float16).astype(np.float32)
+    return table, texels
 
 
 def _halve(level: np.ndarray) -> np.ndarray:
