@@ -28,7 +28,7 @@ from .grid import Grid
 
 POINTS = 16  # places of a patch where light is measured
 RAYS = 4  # that leave a patch for others, from its points in turn; a multiple of 4
-SAMPLES = (3, 12, 48)  # of direct light: where it is even, uneven, very uneven
+SAMPLES = (4, 16, 64)  # of direct light: where it is even, uneven, very uneven
 MOST_PARTS = 16  # in which direct light of lamps is kept
 EMITTERS, ALL = "emitters", "all"
 Part = tuple[int, int] | str  # of the light: a range of the list of lamps and suns, EMITTERS, or ALL
@@ -36,7 +36,7 @@ NO_PATCH, NOTHING = -1, -2  # in place of a patch: not bound; nothing to bind
 ANGLE = 0.5  # radians: most edge of a patch as a probe sees it
 _MANY_PROBES = 128  # in smaller grids probes share less, and patches are smaller in their sight
 _LEAST_ANGLE = 0.25  # of ANGLE
-_MANY = 36000  # patches whose mean is good with the plain number of rays
+_MANY = 44000  # patches whose mean is good with the plain number of rays
 _MOST_EFFORT = 256
 _UNEVEN = (0.6, 3.0)  # error of four points, of the mean light, from which on the second and third number is taken
 _CELL_SHARE = 0.25  # of the grid's shortest spacing: edge of plain cells
@@ -52,7 +52,7 @@ _COARSEST = 3  # levels by which patches grow that only rays see
 def effort(count: int, samples: int) -> int:
     """By how much RAYS and SAMPLES are multiplied for a bake of ``count`` patches with the setting ``samples``: what
     probes see is the mean over patches, so few patches need more of each."""
-    few = int(np.clip((_MANY / max(count, 1)) ** 1.5, 1, 16))
+    few = 2 ** int(np.clip(1.5 * np.log2(_MANY / max(count, 1)), 0, 4))
     return min(few * samples, _MOST_EFFORT)
 
 

@@ -65,11 +65,11 @@ class PatchLight:
 
     def _sees(self, hits: gpu.types.GPUTexture):
         def sees(items: np.ndarray, patches: np.ndarray) -> np.ndarray:
-            shader = program("patch_visible_comp", POINTS=POINTS, **self._scene.ray_defines)
+            shader = program("patch_visible_comp", POINTS=1, **self._scene.ray_defines)
             pairs = np.zeros((len(items), 4), np.float32)
             pairs[:, 0], pairs[:, 1] = items, patches
             visible = allocate(len(items), "hits", "R32F")
-            pair_texture, points = upload(pairs, "hits"), upload(self.patches.points, "patches")
+            pair_texture, points = upload(pairs, "hits"), upload(self.patches.points[:, 0], "patches")
             self._scene.bind_rays(shader)
             shader.uniform_sampler("hits", hits)
             shader.uniform_sampler("pairs", pair_texture)

@@ -189,7 +189,7 @@ def test_two_runs_number_alike():
 
 
 def test_few_patches_get_more_effort():
-    assert [patches.effort(count, 1) for count in (40_000, 20_000, 9_000, 5_000, 1, 0)] == [1, 2, 4, 8, 8, 8]
+    assert [patches.effort(count, 1) for count in (40_000, 20_000, 9_000, 5_000, 1, 0)] == [1, 2, 8, 16, 16, 16]
     assert patches.effort(40_000, 4) == 4 and patches.effort(1, 4096) == 256
 
 
