@@ -62,8 +62,14 @@ class Grid:
 
     @property
     def center(self) -> np.ndarray:
-        """(3,) float64 world position of the box's middle: the origin of all GPU work."""
+        """(3,) float64 world position of the box's middle."""
         return self.matrix[:3, 3].copy()
+
+    @property
+    def origin(self) -> np.ndarray:
+        """(3,) float64 world position that all GPU work is relative to: the box's middle, or that of the whole of which
+        this is a part."""
+        return self.center
 
     def lattice(self) -> np.ndarray:
         """(count, 3) integer node coordinates (i, j, k) in flat order."""

@@ -77,7 +77,7 @@ def light_parts(lamps: int, has_emitters: bool) -> list[Part]:
 
 
 class Patches:
-    """All patches of a bake. Positions are metres relative to the grid's centre.
+    """All patches of a bake. Positions are metres relative to the grid's origin.
 
     ``points`` (N, POINTS, 4) float32: position and packed normal; the first is the leader, which every hit of the
     patch sees. ``seen`` (N,) bool: a texel of a probe lies on it.
@@ -92,6 +92,7 @@ class Patches:
         self._angle = ANGLE * float(np.clip(np.sqrt(grid.count / _MANY_PROBES), _LEAST_ANGLE, 1.0))
         self._to_box = np.linalg.inv(grid.matrix[:3, :3]).astype(np.float32)
         self._half = np.linalg.norm(grid.matrix[:3, :3], axis=0).astype(np.float32)
+        self._middle = (grid.center - grid.origin).astype(np.float32)  # of the box, in the frame of hits
         self._keys = [np.zeros(0, np.uint64) for _ in range(_VARIANTS)]  # sorted
         self._ids = [np.zeros(0, np.int64) for _ in range(_VARIANTS)]
         self.points = np.zeros((0, POINTS, 4), np.float32)
@@ -157,7 +158,7 @@ class Patches:
         """(H,) uint64: size, place and facing of the cell that each of ``hits`` lies in."""
         # Columns in float32: bakes bind millions of hits, and only borders of cells move by rounding.
         position = np.ascontiguousarray(hits[:, :3].T)
-        beyond = np.maximum(np.abs(self._to_box @ position) - 1, 0) * self._half[:, None]
+        beyond = np.maximum(np.abs(self._to_box @ (position - self._middle[:, None])) - 1, 0) * self._half[:, None]
         wanted = np.maximum(np.float32(0.5 * self._angle / self.cell) * np.sqrt((beyond * beyond).sum(axis=0)), 1)
         if view_distance is not None:
             wanted = np.minimum(wanted, np.float32(self._angle / self.cell) * view_distance.astype(np.float32))
