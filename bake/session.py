@@ -46,6 +46,7 @@ class BakeSession:
     the one given.
 
     ``edits``: probes that the user switched off or moved. Moved ones capture where they were put and are not relocated.
+    ``stopwatch``: one that measures more than seconds by phase.
     """
 
     def __init__(
@@ -56,6 +57,7 @@ class BakeSession:
         reporter: Reporter,
         edits: ProbeEdits | None = None,
         result: BakeResult | None = None,
+        stopwatch: Stopwatch | None = None,
     ):
         self.snapshot = snapshot
         self.grid = grid
@@ -63,7 +65,8 @@ class BakeSession:
         self.result = result or BakeResult()
         self._reporter = reporter
         self._edits = edits or ProbeEdits.none(grid)
-        self._stopwatch = Stopwatch(self.result.seconds)
+        self._stopwatch = stopwatch or Stopwatch({})
+        self._stopwatch.seconds = self.result.seconds
 
     # The bake
     # ------------------------------------------------------------------------------------------------------------------
@@ -85,7 +88,9 @@ class BakeSession:
             self.backend = GpuBackend(self.snapshot, self.grid, self.settings)
         yield
         result.scene = self.backend.scene
-        result.capture, reason = choose_capture(self.settings, self.backend.scene.triangle_count)
+        result.capture, reason = choose_capture(
+            self.settings, self.backend.scene.triangle_count, int((self._state == ACTIVE).sum())
+        )
         result.notes.append(reason)
         self._batches = Batches(self.backend, np.flatnonzero(self._state == ACTIVE), result.capture, self._stopwatch)
         if not self._batches.resident:

@@ -1,19 +1,31 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``gridlight bench``: speed against error, ours and the peers' side by side, in one run on one machine.
 
-``bench peers`` gives every peer a process of its own, one after the other. What each measures is in ``bench_measure``.
+Everything is measured in processes of their own, one after the other (``bench_measure``), so that one that fails ends
+only itself. A benchmark is a module ``bench_NAME`` as ``bench_run`` describes it.
 """
 
 from __future__ import annotations
 
+import importlib
 import json
+from pathlib import Path
 
 from ..core.errors import InputError
 from ..formats.staging import StagedFolder
-from . import bake, bench_peers
+from . import bake, bench_run
 
 HELP = "measures speed against error, peers side by side"
 NEEDS_BLENDER = NEEDS_GPU = False  # this process only starts others, which have both
+
+
+# name -> (what it measures, seconds that it may take unless --limit says something else)
+BENCHMARKS = {
+    "peers": ("the gallery by our bake, Cycles panoramas and EEVEE", 1800.0),
+    "scaling": ("cost of a bake over probes, triangles and texels, by phase", 600.0),
+    "pareto": ("error over time of many settings, ours and the peers'", 1800.0),
+    "frame": ("a time-sliced relight and a preview frame, by shader", 600.0),
+}
 
 
 def add_arguments(parser, in_blender: bool) -> None:
@@ -21,11 +33,11 @@ def add_arguments(parser, in_blender: bool) -> None:
         "name",
         metavar="NAME",
         nargs="?",
-        choices=("peers",),
+        choices=BENCHMARKS,
         default="peers",
-        help="peers: the gallery by our bake, Cycles panoramas and EEVEE (default; the only one)",
+        help="; ".join(f"{name}: {what}" for name, (what, _) in BENCHMARKS.items()) + " (default %(default)s)",
     )
-    parser.add_argument("-o", "--output", metavar="DIR", help="folder for peers.txt, peers.json and peers.svg")
+    parser.add_argument("-o", "--output", metavar="DIR", help="folder for NAME.txt, NAME.json and NAME.svg")
     parser.add_argument(
         "--panoramas",
         metavar="N",
@@ -55,8 +67,16 @@ def add_arguments(parser, in_blender: bool) -> None:
         "--limit",
         metavar="SECONDS",
         type=float,
-        default=1800.0,
-        help="time that each peer may take (default %(default)s)",
+        help="time that each peer may take, or all of scaling and frame (default: 1800 or 600)",
+    )
+    parser.add_argument(
+        "--budget", metavar="SECONDS", type=float, help="time for everything: what does not fit is left out and named"
+    )
+    parser.add_argument(
+        "--scene",
+        metavar="NAME",
+        action="append",
+        help="for pareto: gallery, cornell or a .blend; repeatable (default: gallery and cornell)",
     )
     bake.add_settings(parser)
     parser.add_argument("--quiet", action="store_true", help="no progress; warnings stay")
@@ -74,9 +94,13 @@ def check(args) -> None:
         ("--eevee-samples", args.eevee_samples, 1, 1 << 20),
         ("--error-spp", args.error_spp, 1, 1 << 20),
         ("--limit", args.limit, 1, 1e6),
+        ("--budget", args.budget, 1, 1e6),
     ):
         if value is not None and not low <= value <= high:
             raise InputError(f"{name} is {value}; it must lie between {low} and {high:g}")
+    for name in args.scene or []:
+        if name not in bench_run.SCENES and not Path(name).is_file():
+            raise InputError(f"{name}: no such file; name one, or {' or '.join(bench_run.SCENES)}")
 
 
 def run(args, reporter, should_stop):
@@ -85,7 +109,10 @@ def run(args, reporter, should_stop):
 
         return bench_measure.measure(json.loads(args.measure), reporter, should_stop)
     check(args)
+    benchmark = importlib.import_module(f".bench_{args.name}", __package__)
+    if args.limit is None:
+        args.limit = BENCHMARKS[args.name][1]
     if args.output is None:
-        return bench_peers.run(args, reporter, None)
+        return bench_run.run(benchmark, args, reporter, None)
     with StagedFolder(args.output) as folder:  # refuses a folder that cannot be written before the long work
-        return bench_peers.run(args, reporter, folder)
+        return bench_run.run(benchmark, args, reporter, folder)

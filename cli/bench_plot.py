@@ -6,18 +6,17 @@ Both time axes are logarithmic: the peers are orders of magnitude apart.
 
 from __future__ import annotations
 
-import math
 from html import escape
 
+from .bench_chart import GREY, INK, Scale
 from .bench_table import significant
 
 _WIDTH, _LEFT, _RIGHT, _TOP, _BOTTOM = 860, 70, 40, 46, 46
 _COLOURS = {"Gridlight": "#c2410c", "Cycles panoramas": "#1d4ed8", "EEVEE volume": "#15803d"}
-_GREY, _INK = "#d4d4d4", "#262626"
 
 
 def plot(summary: dict) -> str:
-    """SVG text of ``summary`` as ``bench_peers.run`` makes it."""
+    """SVG text of ``summary`` as ``bench_peers.measure`` describes it."""
     rows = [row for row in summary["rows"] if row["seconds"] is not None]
     return _error_over_time(summary, rows) if summary["reference"] else _bars(summary, rows)
 
@@ -30,31 +29,12 @@ def _setting(row: dict) -> str:
     return row["setting"] if row["run"] == "persistent" else f"{row['setting']}, {row['run']}"
 
 
-class _Scale:
-    """A logarithmic axis over whole decades from ``start`` to ``end`` in picture units."""
-
-    def __init__(self, values: list[float], start: float, end: float):
-        self.low = math.floor(math.log10(min(values)))
-        self.high = max(math.ceil(math.log10(max(values))), self.low + 1)
-        self._start, self._end = start, end
-
-    def __call__(self, value: float) -> float:
-        return self._start + (self._end - self._start) * (math.log10(value) - self.low) / (self.high - self.low)
-
-    def ticks(self) -> list[tuple[float, str]]:
-        """(value, label) at 1, 2 and 5 of every decade; only decades carry a label where there are many."""
-        ticks = [(step * 10.0**power, step) for power in range(self.low, self.high) for step in (1, 2, 5)]
-        ticks.append((10.0**self.high, 1))
-        few = self.high - self.low <= 3
-        return [(value, f"{value:g}" if few or step == 1 else "") for value, step in ticks]
-
-
-def _time_axis(scale: _Scale, top: float, bottom: float) -> list[str]:
+def _time_axis(scale: Scale, top: float, bottom: float) -> list[str]:
     parts = []
     for value, label in scale.ticks():
         at = scale(value)
         parts.append(
-            f'<line x1="{at:.1f}" x2="{at:.1f}" y1="{top}" y2="{bottom}" stroke="{_GREY}"/>'
+            f'<line x1="{at:.1f}" x2="{at:.1f}" y1="{top}" y2="{bottom}" stroke="{GREY}"/>'
             f'<text x="{at:.1f}" y="{bottom + 17}" text-anchor="middle">{label}</text>'
         )
     middle = (scale(10.0**scale.low) + scale(10.0**scale.high)) / 2
@@ -65,7 +45,7 @@ def _time_axis(scale: _Scale, top: float, bottom: float) -> list[str]:
 def _bars(summary: dict, rows: list[dict]) -> str:
     names_end = 310
     height = _TOP + 28 * len(rows) + _BOTTOM
-    scale = _Scale([row["seconds"] for row in rows], names_end, _WIDTH - 80)
+    scale = Scale([row["seconds"] for row in rows], names_end, _WIDTH - 80)
     bottom = height - _BOTTOM
     parts = _time_axis(scale, _TOP, bottom)
     for index, row in enumerate(rows):
@@ -85,12 +65,12 @@ def _error_over_time(summary: dict, rows: list[dict]) -> str:
     reference = summary["reference"]
     floor = 100 * reference["floor"]["relative_rms"]
     errors = [100 * row["error"]["relative_rms"] for row in rows if row["error"]]
-    across = _Scale([row["seconds"] for row in rows], _LEFT, _WIDTH - _RIGHT)
-    up = _Scale([value for value in [*errors, floor] if value > 0], bottom, _TOP)
+    across = Scale([row["seconds"] for row in rows], _LEFT, _WIDTH - _RIGHT)
+    up = Scale([value for value in [*errors, floor] if value > 0], bottom, _TOP)
     parts = _time_axis(across, _TOP, bottom)
     for value, label in up.ticks():
         parts.append(
-            f'<line x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{up(value):.1f}" y2="{up(value):.1f}" stroke="{_GREY}"/>'
+            f'<line x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{up(value):.1f}" y2="{up(value):.1f}" stroke="{GREY}"/>'
             f'<text x="{_LEFT - 8}" y="{up(value) + 4:.1f}" text-anchor="end">{label}</text>'
         )
     parts.append(
@@ -99,7 +79,7 @@ def _error_over_time(summary: dict, rows: list[dict]) -> str:
     )
     if floor > 0:
         parts.append(
-            f'<line x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{up(floor):.1f}" y2="{up(floor):.1f}" stroke="{_INK}" '
+            f'<line x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{up(floor):.1f}" y2="{up(floor):.1f}" stroke="{INK}" '
             f'stroke-dasharray="2 4"/><text x="{_WIDTH - _RIGHT - 4}" y="{up(floor) - 6:.1f}" text-anchor="end">'
             f"floor of {reference['bands']} bands</text>"
         )
@@ -153,7 +133,7 @@ def _page(summary: dict, height: int, title: str, parts: list[str]) -> str:
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {height}" width="{_WIDTH}" height="{height}" '
         'font-family="sans-serif" font-size="13" '
-        f'fill="{_INK}"><title>{heading}</title><rect width="100%" height="100%" fill="#ffffff"/>'
+        f'fill="{INK}"><title>{heading}</title><rect width="100%" height="100%" fill="#ffffff"/>'
         f'<text x="14" y="18" font-weight="bold">{heading}</text><text x="14" y="34" font-size="11">{device}</text>'
         f"{''.join(parts)}</svg>\n"
     )

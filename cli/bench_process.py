@@ -76,7 +76,7 @@ def _program(in_blender: bool) -> list[str]:
 
 def _why_early(reports: list[dict], code: int, late: bool, limit_s: float) -> str:
     if late:
-        return f"not done after {limit_s:g} s (--limit)"
+        return f"not done after {limit_s:.4g} s (--limit or --budget)"
     if code < 0:
         return f"its process ended with {signal.Signals(-code).name} (--verbose shows Blender's words)"
     problems = [report["problem"] for report in reports if "problem" in report]

@@ -3,32 +3,22 @@
 
 from __future__ import annotations
 
-_LOADED = 0.3  # of the cores busy before the bench began: times are then no longer those of an idle machine
+
+def table(summary: dict) -> list[str]:
+    """Scene, rows and phases of ``summary``, which holds what ``bench_peers.measure`` says."""
+    return [*_scene(summary), "", *_rows(summary), "", *_notes(summary)]
 
 
-def table(summary: dict) -> str:
-    """Head, rows and phases of ``summary`` as ``bench_peers.run`` makes it."""
-    return "\n".join([*_head(summary), "", *_rows(summary), "", *_notes(summary)])
-
-
-def _head(summary: dict) -> list[str]:
-    machine, scene, bake = summary["machine"], summary["scene"], summary["bake"]
+def _scene(summary: dict) -> list[str]:
+    scene, bake = summary["scene"], summary["bake"]
     probes = scene["probes"]
-    lines = [
-        f"command   {summary['command']}",
-        f"versions  Gridlight {summary['version']}, Blender {summary['blender']}",
-        f"GPU       {summary['device']}",
-        f"CPU       {machine['cores']} × {machine['processor']}, {machine['system']} (Cycles runs here)",
-        f"scene     gallery, {scene['triangles']} triangles, {scene['locations']} locations "
+    return [
+        f"scene     {scene['name']}, {scene['triangles']} triangles, {scene['locations']} locations "
         f"({'×'.join(map(str, scene['resolution']))})",
         f"our bake  {probes['active']} active, {probes['culled']} culled, {probes['invalid']} invalid; "
         f"{bake['iterations']} iterations, {'converged' if bake['converged'] else 'NOT converged'}; "
         f"capture {bake['capture']}",
     ]
-    load = machine["load_before"]
-    if load is not None and load > _LOADED * machine["cores"]:
-        lines.append(f"load      {load:.1f} before the bench began: the times are not those of an idle machine")
-    return lines
 
 
 def _rows(summary: dict) -> list[str]:
@@ -43,12 +33,20 @@ def _rows(summary: dict) -> list[str]:
         figures = [significant(row[name]) for name in ("seconds", "probes_per_second", "ratio_to_warm")]
         run = f"{row['measured']} scaled" if scaled else row["run"]
         cells.append([row["peer"], row["setting"], run, *figures, *error])
-    widths = [max(len(line[column]) for line in cells if len(line) == len(cells[0])) for column in range(len(cells[0]))]
-    for column in (0, 1):  # rows without figures have these too
-        widths[column] = max(len(line[column]) for line in cells)
+    return columns(cells, left=3)
+
+
+def columns(cells: list[list[str]], left: int = 1) -> list[str]:
+    """``cells`` as lines with aligned columns, the first ``left`` to the left. The last cell of a row that is shorter
+    than the first one may stick out."""
+    full = len(cells[0])
+    widths = [
+        max(len(line[column]) for line in cells if len(line) == full or column < len(line) - 1)
+        for column in range(full)
+    ]
     return [
         "  ".join(
-            cell.ljust(width) if column < 3 else cell.rjust(width)
+            cell.ljust(width) if column < left else cell.rjust(width)
             for column, (cell, width) in enumerate(zip(line, widths))
         ).rstrip()
         for line in cells

@@ -149,16 +149,19 @@ class GpuBackend:
         for first_layer in range(start, stop, self._probes_per_capture):
             part = min(self._probes_per_capture, stop - first_layer)
             first_slot = surfaces.first + first_layer
-            hits = self._hit_images(part)
-            if method == "raster":
-                if self._raster is None:
-                    self._raster = RasterCapture(self.scene, self.face, hits.layers // 6)
-                self._raster(
-                    self._positions[first_slot : first_slot + part], first_slot, self.probe_slots, hits.texture
-                )
-            else:
-                self._trace(first_slot, part, hits)
+            hits = self.find_hits(first_slot, part, method)
             self._resolve(first_slot, first_layer, part, hits, surfaces)
+
+    def find_hits(self, first_slot: int, count: int, method: str) -> _Hits:
+        """What the texels of ``count`` probes from ``first_slot`` see; holds until the next call."""
+        hits = self._hit_images(count)
+        if method == "raster":
+            if self._raster is None:
+                self._raster = RasterCapture(self.scene, self.face, hits.layers // 6)
+            self._raster(self._positions[first_slot : first_slot + count], first_slot, self.probe_slots, hits.texture)
+        else:
+            self._trace(first_slot, count, hits)
+        return hits
 
     def _hit_images(self, count: int):
         if self._hits is None or self._hits.layers < count * 6:

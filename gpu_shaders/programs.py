@@ -9,14 +9,18 @@ from pathlib import Path
 import gpu
 
 from ..core.errors import NoGpuError
-from . import create_infos, relight_create_infos, viewport_create_infos
+from . import create_infos, measure_create_infos, relight_create_infos, viewport_create_infos
 
 _GLSL = Path(__file__).parent / "glsl"
-_BINDINGS = (create_infos, relight_create_infos, viewport_create_infos)
+_BINDINGS = (create_infos, measure_create_infos, relight_create_infos, viewport_create_infos)
 
 # Never emptied: in Blender 4.5 and 5.0 the address of a freed shader can be reused, and the old program then runs
 # silently.
 _programs: dict[tuple, gpu.types.GPUShader] = {}
+
+# Called with (name, shader) for every program that is asked for; what it returns takes the shader's place. For
+# measurements alone (dispatch_profile.py).
+observer = None
 
 
 def program(name: str, **defines) -> gpu.types.GPUShader:
@@ -31,7 +35,7 @@ def program(name: str, **defines) -> gpu.types.GPUShader:
     key = (name, chosen)
     if key not in _programs:
         _programs[key] = _compile(name, dict(chosen))
-    return _programs[key]
+    return _programs[key] if observer is None else observer(name, _programs[key])
 
 
 def _compile(name: str, defines: dict) -> gpu.types.GPUShader:

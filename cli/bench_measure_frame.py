@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``bench frame``, the child's side: the gallery while a light moves, slice by slice, picture by picture."""
+
+from __future__ import annotations
+
+import cProfile
+import math
+import pstats
+import time
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..bake.job import drive
+from ..bake.session import BakeSession
+from ..core import camera as cameras
+from ..core.conventions import ACTIVE
+from ..core.field import Field
+from ..core.settings import BakeSettings
+from ..core.snapshot import SceneSnapshot
+from ..core.view import View
+from ..gpu_shaders.context import device_description, ensure_context
+from ..gpu_shaders.dispatch_profile import limits, profiled
+from ..gpu_shaders.fence import Fence
+from ..gpu_shaders.scene_textures import SceneTextures
+from ..gpu_shaders.viewport_field import FieldTextures
+from ..gpu_shaders.viewport_pass import Picture, ViewportPass
+from ..gpu_shaders.viewport_shading import Shading
+from ..scene.read import read_scene
+from ..viewport.live_bake import LiveBake, Target
+from . import bench_scenes
+from .bench_measure import report
+from .bench_measure_peers import load_scene
+from .bench_phases import PhaseClock
+
+WIDTH, HEIGHT = 1920, 1080
+_SLICE_SECONDS = 1 / 60
+_LEAST_PICTURES, _MOST_PICTURES = 3, 120
+_MODES = {
+    "FULL": "picture",
+    "NORMALS": "picture without light",
+    "DIRECT": "picture, direct light only",
+    "INDIRECT": "picture, light of probes only",
+}
+_SWING_M = 0.4  # radius of the circle that the light moves on
+_FUNCTIONS = 14  # of Python that are named
+
+
+def frame(request: dict, reporter, should_stop) -> None:
+    """Slices, whole relights, pictures: each as a series of seconds under "run"; then where the time goes."""
+    ends = time.perf_counter() + request["seconds"]
+    scene = load_scene(request, reporter)
+    ensure_context()
+    snapshot = read_scene(scene)
+    grid = bench_scenes.grid_of(request["scene"], snapshot)
+    settings = BakeSettings(**request["settings"])
+    reporter.phase("bake")
+    live = LiveBake()
+    target = [Target(grid, None)]
+    started = time.perf_counter()
+    fields = _follow(live, snapshot, target, settings, math.inf)[0]
+    cold = time.perf_counter() - started
+    field = fields[grid.name]
+    report(
+        {
+            "device": device_description(),
+            "blender": bpy.app.version_string,
+            "scene": {
+                "name": request["scene"],
+                "triangles": len(snapshot.triangles),
+                "locations": grid.count,
+                "active": int((field.state == ACTIVE).sum()),
+                "lights": len(snapshot.lights),
+            },
+            "cold_bake_seconds": cold,
+            "picture": [WIDTH, HEIGHT],
+        }
+    )
+    view = _Views(snapshot, field)
+    _moves(request, live, snapshot, target, settings, view, ends, reporter, should_stop)
+    reporter.phase("where the time goes")
+    _where_it_goes(snapshot, grid, settings, should_stop)
+    reporter.phase("pictures")
+    _pictures(view, ends, should_stop)
+    reporter.finish()
+
+
+def _moves(request, live, snapshot, target, settings, view, ends: float, reporter, should_stop) -> None:
+    """A light moves, and its light is followed: series of slices, of whole relights, of handing light to the view."""
+    reporter.phase("a light moves", request["moves"])
+    series: dict[str, list[float]] = {}
+    until = time.perf_counter() + 0.4 * (ends - time.perf_counter())
+    for move in range(request["moves"] + 2):
+        if move == 2:
+            series.clear()  # the first two compile shaders and fill caches
+        moved = with_moved_light(snapshot, move)
+        fields, slices = _follow(live, moved, target, settings, _SLICE_SECONDS)
+        _add(series, "slice", *slices)
+        _add(series, "relight, sliced", sum(slices))
+        _add(series, "new light to the view", view.show(moved, fields))
+        reporter.advance()
+        if should_stop() or (move > 4 and time.perf_counter() > until):
+            break
+    for name, seconds in series.items():
+        report({"run": name, **spread(seconds)})
+
+
+def _pictures(view: _Views, ends: float, should_stop) -> None:
+    """Pictures with all light, and with parts of it, one after the other until the time is up."""
+    for index, mode in enumerate(_MODES):
+        seconds = [view.draw(mode)]
+        if index == 0:
+            report({"cold_picture_seconds": seconds[0]})
+        until = time.perf_counter() + (ends - time.perf_counter()) / (len(_MODES) - index)
+        while len(seconds) <= _LEAST_PICTURES or (len(seconds) <= _MOST_PICTURES and time.perf_counter() < until):
+            seconds.append(view.draw(mode))
+            if should_stop():
+                return
+        report({"run": _MODES[mode], **spread(seconds[1:])})
+
+
+def with_moved_light(snapshot: SceneSnapshot, step: int) -> SceneSnapshot:
+    """``snapshot`` with its first light on a circle around its place."""
+    light = snapshot.lights[0]
+    matrix = light.matrix.copy()
+    angle = 2 * np.pi * step / 17.0
+    matrix[:3, 3] += _SWING_M * np.array([np.cos(angle), np.sin(angle), 0.0])
+    return replace(snapshot, lights=[replace(light, matrix=matrix), *snapshot.lights[1:]])
+
+
+def spread(seconds: list[float]) -> dict:
+    """Median, 99th percentile, number."""
+    values = np.asarray(seconds)
+    return {
+        "median": float(np.median(values)),
+        "percentile_99": float(np.percentile(values, 99)),
+        "count": len(values),
+    }
+
+
+def _add(series: dict, name: str, *seconds: float) -> None:
+    series.setdefault(name, []).extend(seconds)
+
+
+def _follow(live: LiveBake, snapshot, targets, settings, budget_s: float) -> tuple[dict, list[float]]:
+    """(fields, seconds of every slice) of following ``snapshot`` in slices of ``budget_s``; the GPU is waited for after
+    each."""
+    fence, slices = Fence(), []
+    live.follow(snapshot, targets, settings)
+    while True:
+        start = time.perf_counter()
+        fields = live.step(budget_s)
+        fence.wait()
+        slices.append(time.perf_counter() - start)
+        if fields:
+            return fields, slices
+        if live.message:
+            raise RuntimeError(live.message)
+
+
+class _Views:
+    """The picture of the scene's camera, or of one in the volume, as the viewport draws it."""
+
+    def __init__(self, snapshot: SceneSnapshot, field: Field):
+        self._origin = field.grid.center
+        self._textures = SceneTextures(snapshot, self._origin, np.zeros(len(snapshot.triangles)))
+        self._pass = ViewportPass(self._textures, self._origin, len(snapshot.object_names), snapshot.world)
+        self._picture = Picture(WIDTH, HEIGHT)
+        self._fence = Fence()
+        self._view = View.from_camera(snapshot.camera or cameras.suggest(field, WIDTH / HEIGHT), 0.05, 200.0)
+
+    def show(self, snapshot: SceneSnapshot, fields: dict) -> float:
+        """Sends lamps and fields; seconds."""
+        start = time.perf_counter()
+        self._textures.set_lights(snapshot.lights, self._origin)
+        self._pass.set_fields([FieldTextures(field, self._origin) for field in fields.values()])
+        self._fence.wait()
+        return time.perf_counter() - start
+
+    def draw(self, mode: str = "FULL") -> float:
+        """Draws one sample afresh; seconds."""
+        self._picture.samples = 0
+        start = time.perf_counter()
+        self._pass.draw(self._picture, self._view, Shading(mode=mode), None)
+        self._fence.wait()
+        return time.perf_counter() - start
+
+
+def _where_it_goes(snapshot: SceneSnapshot, grid, settings: BakeSettings, should_stop) -> None:
+    """Relights in one go: whole, by phase, by shader, by function of Python."""
+    clock = PhaseClock()
+    session = BakeSession(snapshot, grid, settings, clock, stopwatch=clock)
+    drive(session.bake(), should_stop)
+    fence, moves = Fence(), iter(range(1, 1 << 30))
+
+    def relight() -> float:
+        start = time.perf_counter()
+        drive(session.relight(with_moved_light(snapshot, next(moves))), should_stop)
+        fence.wait()
+        return time.perf_counter() - start
+
+    first = [relight() for _ in range(2)]
+    count = int(np.clip(4.0 / max(first[-1], 1e-4), 3, 100))
+    clock.phases.clear()
+    watched = [relight() for _ in range(count)]
+    report(
+        {
+            "run": "relight, whole, phases waited for",
+            **spread(watched),
+            "phases": {name: seconds / count for name, seconds in clock.phases.items()},
+            "patches": session.backend.light.count,
+            "iterations": session.result.iterations,
+        }
+    )
+    device = limits()
+    texel_layers = dict.fromkeys(("geometry", "albedo", "emission"), len(session._batches.nodes))
+    with profiled(texel_layers) as costs:
+        profiled_seconds = [relight() for _ in range(count)]
+    report(
+        {
+            "limits": asdict(device),
+            "profiled_seconds": float(np.median(profiled_seconds)),
+            "shaders": {
+                name: {key: value / count for key, value in asdict(cost).items()} for name, cost in costs.items()
+            },
+        }
+    )
+    profile = cProfile.Profile()
+    profile.enable()
+    for _ in range(count):
+        relight()
+    profile.disable()
+    report({"functions": _slowest(pstats.Stats(profile), count)})
+
+
+def _slowest(stats: pstats.Stats, count: int) -> list[dict]:
+    """The functions with the most time of their own, per relight."""
+    rows = [
+        {
+            "function": f"{Path(file).name}:{name}" if file != "~" else name,
+            "calls": calls / count,
+            "own_seconds": own / count,
+            "whole_seconds": whole / count,
+        }
+        for (file, _line, name), (_, calls, own, whole, _callers) in stats.stats.items()
+    ]
+    return sorted(rows, key=lambda row: -row["own_seconds"])[:_FUNCTIONS]

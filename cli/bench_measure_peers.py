@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The measurements of ``bench peers`` and ``bench pareto``: all of them light the scene that the request names.
+
+* ``gridlight``: reading the scene and the bake to convergence, cold with GPU context and shader compilation, then warm
+  (the median of a few).
+* ``cycles``: one panorama per location of the grid, with persistent data. Building the scene and projecting are not
+  counted.
+* ``eevee``: Blender's own bake of a light probe volume with the same nodes, cold with GPU context and shaders, then
+  warm.
+* ``reference``: what errors are measured against; not a peer, not timed.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..bake.result import BakeResult
+from ..core import lookup
+from ..core import spherical_harmonics as sh
+from ..core.conventions import ACTIVE
+from ..core.errors import Cancelled, InputError
+from ..core.field import Field
+from ..core.grid import Grid
+from ..core.panorama import panorama_irradiance, project_panorama
+from ..core.settings import BakeSettings
+from ..core.snapshot import SceneSnapshot
+from ..gpu_shaders.context import device_description
+from ..scene.cycles_reference import render_panoramas
+from ..scene.read import read_scene
+from . import bench_scenes, pipeline
+from .bench_measure import report
+from .verify_points import SIX_NORMALS, FreeSpace
+
+_MOST_WARM, _WARM_SECONDS = 15, 1.5  # warm bakes, until one of the two is reached
+REFERENCE_WIDTH, REFERENCE_HEIGHT = 128, 64
+PEER_SEED, REFERENCE_SEEDS = 1, (1_000_003, 2_000_003)  # panoramas take consecutive seeds: the series never meet
+
+_EEVEE_VALUES = 4 * 3  # that EEVEE keeps per probe, at least: two bands of RGB as 32-bit floats
+
+
+def gridlight(request: dict, reporter, should_stop) -> int:
+    """Reading and baking with ``request["settings"]``: cold, then warm; irradiance at as many ``nodes`` as asked."""
+    scene = load_scene(request, reporter)
+    settings = BakeSettings(**request["settings"])
+    cold = _bake_once(scene, request["scene"], settings, "cold", reporter, should_stop)
+    report(cold.row)
+    cold, warm, started = None, [], time.perf_counter()  # a bake's textures are freed before the next starts
+    while not warm or (len(warm) < _MOST_WARM and time.perf_counter() - started < _WARM_SECONDS):
+        last = None
+        last = _bake_once(scene, request["scene"], settings, "warm", reporter, should_stop)
+        warm.append(last.row)
+    report({**median_row(warm), "runs": len(warm)})
+    result, snapshot = last.result, last.snapshot
+    grid = result.field.grid
+    report(
+        {
+            "blender": bpy.app.version_string,
+            "scene": {
+                "name": request["scene"],
+                "locations": grid.count,
+                "resolution": list(grid.resolution),
+                "triangles": len(snapshot.triangles),
+                "probes": result.counts,
+            },
+            "bake": {
+                "iterations": result.iterations,
+                "converged": result.converged,
+                "capture": result.capture,
+                "notes": result.notes,
+            },
+            "device": device_description(),
+        }
+    )
+    if request["nodes"]:
+        reporter.phase("error nodes")
+        nodes = free_nodes(result.field, FreeSpace(snapshot), request["nodes"], settings.seed)
+        report({"nodes": nodes.tolist(), "irradiance": irradiance_at(result.field, nodes).tolist()})
+    reporter.finish()
+    return 0 if result.converged or settings.bounces is not None else pipeline.NOT_CONVERGED
+
+
+def median_row(rows: list[dict]) -> dict:
+    """The row of the median time: its phases belong to it."""
+    return sorted(rows, key=lambda row: row["seconds"])[len(rows) // 2]
+
+
+@dataclass
+class _Baked:
+    row: dict
+    snapshot: SceneSnapshot
+    result: BakeResult
+
+
+def _bake_once(scene, name: str, settings: BakeSettings, run: str, reporter, should_stop) -> _Baked:
+    stopwatch = pipeline.Stopwatch()
+    pipeline.start_gpu(reporter, stopwatch)
+    with stopwatch.measure("read"):
+        reporter.phase(f"read ({run})")
+        snapshot = read_scene(scene)
+    grid = bench_scenes.grid_of(name, snapshot)
+    result = pipeline.bake_volumes(snapshot, [grid], settings, reporter, should_stop, stopwatch)[0]
+    seconds = stopwatch.totals()
+    row = {
+        "run": run,
+        "seconds": seconds.pop("total"),
+        "measured": grid.count,
+        "phases": {phase: value for phase, value in seconds.items() if phase != "write"},
+    }
+    return _Baked(row, snapshot, result)
+
+
+def load_scene(request: dict, reporter) -> bpy.types.Scene:
+    """The scene that ``request`` names."""
+    reporter.phase("build")
+    return bench_scenes.load(request["scene"])
+
+
+def irradiance_at(field: Field, points: np.ndarray) -> np.ndarray:
+    """(N, 6, 3) by the lookup at ``points`` (N, 3), six normals each."""
+    count = len(SIX_NORMALS)
+    values = lookup.irradiance(field, np.repeat(points, count, axis=0), np.tile(SIX_NORMALS, (len(points), 1)))
+    return values.reshape(len(points), count, 3)
+
+
+def free_nodes(field: Field, space: FreeSpace, count: int, seed: int) -> np.ndarray:
+    """Up to ``count`` (N, 3) world positions of active nodes in free space, chosen by ``seed``.
+
+    Nodes that the bake moved are left out: a node's own light is compared, not an interpolation.
+
+    Raises:
+        InputError: there is none.
+    """
+    nodes = field.grid.positions()[(field.state == ACTIVE) & ~field.offset.any(axis=1)]
+    nodes = nodes[space.is_free(nodes)]
+    if not len(nodes):
+        raise InputError("no active node stands in free space: there is nothing to measure errors at")
+    return nodes[np.sort(np.random.default_rng(seed).permutation(len(nodes))[:count])]
+
+
+def cycles(request: dict, reporter, should_stop) -> None:
+    """Panoramas at all of the grid's locations or at as many as ``request`` says, and irradiance at its nodes."""
+    scene = load_scene(request, reporter)
+    width, height, samples = request["panorama"]
+    positions = bench_scenes.grid_of(request["scene"], read_scene(scene)).positions()
+    total = len(positions)
+    measured = min(request["panoramas"] or total, total)
+    positions = positions[np.linspace(0, total - 1, measured).round().astype(int)]
+    ticks = []
+
+    def progress(_done, _total):
+        ticks.append(time.perf_counter())
+        reporter.advance(1)
+        if should_stop():
+            raise Cancelled("cancelled")
+
+    reporter.phase(f"Cycles {width}×{height}, {samples} samples", measured)
+    started = time.perf_counter()
+    render_panoramas(scene, positions, width, height, samples, PEER_SEED, progress=progress)
+    first, rest = ticks[0] - started, ticks[-1] - ticks[0]
+    if measured < total:  # the first panorama also carries the scene to Cycles, once: only the others are scaled
+        rest = rest / (measured - 1) * (total - 1) if measured > 1 else first * (total - 1)
+    report(
+        {"run": "persistent", "seconds": first + rest, "measured": measured, "phases": {"first": first, "rest": rest}}
+    )
+    if request["nodes"]:
+        reporter.phase("error nodes", len(request["nodes"]))
+        images = render_panoramas(
+            scene, np.array(request["nodes"]), width, height, samples, PEER_SEED, progress=progress
+        )
+        coefficients = np.stack([project_panorama(image, request["bands"]) for image in images])
+        report({"irradiance": sh.irradiance(coefficients[:, None], SIX_NORMALS).tolist()})
+    reporter.finish()
+
+
+def reference(request: dict, reporter, should_stop) -> None:
+    """Irradiance at ``request["nodes"]`` by two series of fine panoramas, and what bands make of them."""
+    scene = load_scene(request, reporter)
+    nodes = np.array(request["nodes"])
+
+    def progress(_done, _total):
+        reporter.advance(1)
+        if should_stop():
+            raise Cancelled("cancelled")
+
+    reporter.phase("reference", len(REFERENCE_SEEDS) * len(nodes))
+    images = [
+        render_panoramas(scene, nodes, REFERENCE_WIDTH, REFERENCE_HEIGHT, request["samples"], seed, progress=progress)
+        for seed in REFERENCE_SEEDS
+    ]
+    series = [[panorama_irradiance(image, SIX_NORMALS).tolist() for image in row] for row in images]
+    perfect = np.stack([project_panorama(image, request["bands"]) for image in np.mean(images, axis=0)])
+    report({"series": series, "floor": sh.irradiance(perfect[:, None], SIX_NORMALS).tolist()})
+    reporter.finish()
+
+
+def eevee(request: dict, reporter, should_stop) -> None:
+    """Blender's own bake of a light probe volume, cold and warm."""
+    scene = load_scene(request, reporter)
+    grid = bench_scenes.grid_of(request["scene"], read_scene(scene))
+    scene.render.engine = "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
+    item = _eevee_volume(scene, grid, request["samples"])
+    count = grid.count
+    empty = _stored_bytes(item)
+    for run in ("cold", "warm"):
+        if should_stop():
+            raise Cancelled("cancelled")
+        stopwatch = pipeline.Stopwatch()
+        pipeline.start_gpu(reporter, stopwatch)
+        reporter.phase(f"EEVEE volume bake ({run}); it does not say how far it is")
+        with stopwatch.measure("light"):
+            done = bpy.ops.object.lightprobe_cache_bake(subset="ALL")
+        seconds = stopwatch.totals()
+        # The operator also finishes where it has given up, so what it is timed for has to be there.
+        if done != {"FINISHED"} or _stored_bytes(item) - empty < 4 * _EEVEE_VALUES * count:
+            raise InputError("EEVEE's bake ended without a result (--verbose shows Blender's words)")
+        report(
+            {
+                "run": run,
+                "seconds": seconds["total"],
+                "measured": count,
+                "phases": {"setup": seconds["setup"], "bake": seconds["light"]},
+            }
+        )
+        bpy.ops.object.lightprobe_cache_free(subset="ALL")
+    reporter.finish()
+
+
+def _eevee_volume(scene, grid: Grid, samples: int) -> bpy.types.Object:
+    """A light probe volume of EEVEE whose probes stand at the nodes of ``grid``."""
+    data = bpy.data.lightprobes.new("EEVEE volume", "VOLUME")
+    data.resolution_x, data.resolution_y, data.resolution_z = grid.resolution
+    data.bake_samples = samples
+    # EEVEE's probes sit in the middle of cells, ours at their corners: its box is larger by half a cell on every side.
+    counts = np.array(grid.resolution)
+    matrix = grid.matrix.copy()
+    matrix[:3, :3] *= np.where(counts > 1, counts / np.maximum(counts - 1, 1), 1.0)
+    item = bpy.data.objects.new("EEVEE volume", data)
+    item.matrix_world = Matrix(matrix.tolist())
+    scene.collection.objects.link(item)
+    scene.view_layers[0].update()
+    return item
+
+
+def _stored_bytes(item: bpy.types.Object) -> int:
+    """Size of ``item`` in a file, the only sign of a baked volume that Python can see."""
+    with tempfile.TemporaryDirectory(prefix="gridlight-") as folder:
+        path = os.path.join(folder, "item.blend")
+        bpy.data.libraries.write(path, {item})
+        return os.path.getsize(path)
