@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass
 
-FEW, MANY = 12, 4096  # triangles of the trial scenes
+FEW, MANY = 12, 2048  # triangles of the trial scenes
 MOST = 1 << 24  # triangles; more do not fit the GPU
 
 
