@@ -5,7 +5,7 @@
 SERIES ?=
 ARGUMENTS ?=
 
-.PHONY: test unit gpu demo nightly
+.PHONY: test unit gpu gui demo nightly bench zip lint
 
 test:
 	@./scripts/test $(SERIES) -- tests -m "not nightly" $(ARGUMENTS)
@@ -16,8 +16,22 @@ unit:
 gpu:
 	@./scripts/test $(SERIES) -- tests/gpu -m "not nightly" $(ARGUMENTS)
 
+gui:
+	@./scripts/test $(or $(firstword $(SERIES)),5.2) -- tests/gui -m "not nightly" $(ARGUMENTS)
+
 nightly:
 	@./scripts/test $(SERIES) -- tests $(ARGUMENTS)
 
 demo:
 	@./gridlight demo -o out/demo
+
+bench:
+	@./gridlight bench peers $(ARGUMENTS)
+
+# The extension for each platform, in out/zip.
+zip:
+	@"$$(./gridlight --environment)" -I scripts/build_zip.py $(ARGUMENTS)
+
+# ruff and mypy, in an environment of their own.
+lint:
+	@./scripts/lint
