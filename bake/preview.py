@@ -61,7 +61,7 @@ def save_png(path: Path, values: np.ndarray) -> None:
     try:
         pixels = np.ones((height, width, 4), np.float32)
         pixels[..., :3] = values
-        image.pixels.foreach_set(pixels.reshape(-1))
+        image.pixels.foreach_set(pixels.reshape(-1))  # type: ignore[arg-type]
         image.filepath_raw = str(path)
         image.file_format = "PNG"
         image.save()

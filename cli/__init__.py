@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Headless commands, the same ones for ``./gridlight`` and ``blender --command gridlight``."""
 
-_registered = []
+_registered: list = []
 
 
 def register():

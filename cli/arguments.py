@@ -38,8 +38,8 @@ SIGNED_OPTIONS = (
 class Parser(argparse.ArgumentParser):
     """argparse whose errors are one plain line, raised as InputError."""
 
-    def __init__(self, *args, **kwargs):
-        super().__init__(*args, allow_abbrev=False, **kwargs)
+    def __init__(self, **options):
+        super().__init__(allow_abbrev=False, **options)
 
     def error(self, message):
         raise InputError(f"{' '.join(message.split())} ('{self.prog} --help' lists the options)")
@@ -47,7 +47,7 @@ class Parser(argparse.ArgumentParser):
 
 def join_signed_values(argv: list[str]) -> list[str]:
     """``argv`` with ``--min -1,-2,0`` written as ``--min=-1,-2,0``, which argparse reads as meant."""
-    joined = []
+    joined: list[str] = []
     words = iter(argv)
     for word in words:
         if word == "--":

@@ -171,7 +171,7 @@ def run(args, reporter, should_stop):
             raise Cancelled("cancelled")
         pipeline.start_gpu(reporter, stopwatch)
         edits = [edits_of(scene, grid) for grid in grids]
-        kept = [] if args.relight else None
+        kept: list | None = [] if args.relight else None
         results = pipeline.bake_volumes(snapshot, grids, settings, reporter, should_stop, stopwatch, edits, kept)
         title = Path(args.file or bpy.data.filepath or scene.name).name
         summary, status = pipeline.write_results(
@@ -207,4 +207,5 @@ def _resolution(args, volume: Volume) -> tuple[int, int, int]:
         return args.resolution or volume.resolution
     extent = 2 * np.linalg.norm(volume.matrix[:3, :3], axis=0)
     cells = np.rint(np.minimum(extent / args.spacing, 1e6))  # Grid refuses what is too many, in plain numbers
-    return tuple(int(count) + 1 for count in cells)
+    nx, ny, nz = (int(count) + 1 for count in cells)
+    return nx, ny, nz

@@ -71,7 +71,7 @@ def _guarded(argv: list[str], in_blender: bool, child: bool) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 0
     except SystemExit as end:  # argparse after --help; Blender must not end for it
-        return end.code or 0
+        return int(end.code or 0)
     except MemoryError:
         _say("not enough memory for this; use a lower --resolution, --face or --memory")
         return InputError.exit_status

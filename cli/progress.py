@@ -27,7 +27,7 @@ class Reporter:
         self._clock = clock
         self._in_place = self._stream.isatty()
         self._name = ""
-        self._total = None
+        self._total: int | None = None
         self._done = 0
         self._started = self._shown = self._clock()
         self._drawn = 0  # characters standing in the terminal's current line

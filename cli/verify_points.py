@@ -105,7 +105,7 @@ class FreeSpace:
             for column, direction in enumerate(directions.tolist()):
                 _, normal, triangle, _ = self._tree.ray_cast(point, direction)
                 if triangle is not None:
-                    front = sum(a * b for a, b in zip(normal, direction)) < 0
+                    front = sum(a * b for a, b in zip(normal, direction)) < 0  # type: ignore[call-overload]
                     seen[row, column] = (1 if front else -1) * (int(objects[triangle]) + 1)
         return seen
 

@@ -39,7 +39,7 @@ class BlockGrid(Grid):
 
 @dataclass(frozen=True)
 class Block:
-    """Block ``index`` of ``count``: nodes ``low`` .. ``high`` (excluded) along each axis of a grid of ``resolution``."""
+    """Block ``index`` of ``count``: nodes ``low`` .. ``high`` (excluded) along each axis of ``resolution`` nodes."""
 
     index: int
     count: int
@@ -55,7 +55,8 @@ class Block:
     @property
     def shape(self) -> tuple[int, int, int]:
         """Nodes along each axis."""
-        return tuple(high - low for low, high in zip(self.low, self.high))
+        x, y, z = (high - low for low, high in zip(self.low, self.high))
+        return x, y, z
 
     @property
     def size(self) -> int:
@@ -94,7 +95,8 @@ class Block:
 
 def cut(grid: Grid, most: int) -> list[Block]:
     """``grid`` in blocks of at most ``most`` nodes, in their order."""
-    resolution = tuple(int(count) for count in grid.resolution)
+    nx, ny, nz = (int(count) for count in grid.resolution)
+    resolution = nx, ny, nz
     boxes = _halved((0, 0, 0), resolution, grid.cell_size(), most)
     return [Block(index, len(boxes), low, high, resolution) for index, (low, high) in enumerate(boxes)]
 

@@ -287,13 +287,13 @@ def _flatten(tree: _BinaryTree, order: np.ndarray) -> Hierarchy:
     starts = np.cumsum([0, *(len(c) for c, _ in levels)])
     children = np.concatenate([c for c, _ in levels])
     numbers = np.concatenate([n for _, n in levels])
-    used = children >= 0
+    is_used = children >= 0
     nodes = np.zeros((len(children), NODE_TEXELS, WIDTH), np.float32)
-    nodes[:, 0:3] = np.where(used[:, None, :], tree.low[:, children].transpose(1, 0, 2), _EMPTY)
-    nodes[:, 3:6] = np.where(used[:, None, :], tree.high[:, children].transpose(1, 0, 2), -_EMPTY)
+    nodes[:, 0:3] = np.where(is_used[:, None, :], tree.low[:, children].transpose(1, 0, 2), _EMPTY)
+    nodes[:, 3:6] = np.where(is_used[:, None, :], tree.high[:, children].transpose(1, 0, 2), -_EMPTY)
     nodes[:, 6] = np.where(numbers >= 0, numbers, -1 - first[children])
 
-    leaves = children[used & (numbers < 0)]
+    leaves = children[is_used & (numbers < 0)]
     leaf_end = np.zeros(count, bool)
     leaf_end[first[leaves] + size[leaves] - 1] = True
     extent = _extent(nodes)

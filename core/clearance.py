@@ -185,7 +185,8 @@ def _near_pairs(
         row, triangle = row[close], triangle[close]
         apart = np.linalg.norm(positions[row] - nearest_points(triangles[triangle], positions[row]), axis=1)
         found.append((row[apart < 2 * reach], triangle[apart < 2 * reach]))
-    return tuple(np.concatenate(column) for column in zip(*found))
+    rows, near_triangles = zip(*found)
+    return np.concatenate(rows), np.concatenate(near_triangles)
 
 
 def _nearest_of_each(probe: np.ndarray, distance: np.ndarray) -> np.ndarray:

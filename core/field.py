@@ -30,7 +30,8 @@ class Field:
     offset: np.ndarray  # (P, 3) float32 metres
     depth: np.ndarray  # (P, DEPTH_EDGE², 2) float32
     metadata: dict = field(default_factory=dict)
-    gradient: np.ndarray | None = None  # (P, 3, K, 3) float32, K = min(bands, 3)²
+    # (P, 3, K, 3) float32, K = min(bands, 3)²; __post_init__ fills it in
+    gradient: np.ndarray = None  # type: ignore[assignment]
 
     def __post_init__(self):
         if self.gradient is None:

@@ -53,7 +53,8 @@ class Grid:
             raise InputError(f"the volume has no size along {axis}: --max must be greater than --min")
         matrix = np.diag([*(high - low) / 2, 1.0])
         matrix[:3, 3] = (low + high) / 2
-        return cls(matrix, tuple(int(n) for n in resolution), name)
+        nx, ny, nz = (int(n) for n in resolution)
+        return cls(matrix, (nx, ny, nz), name)
 
     @property
     def count(self) -> int:

@@ -106,8 +106,8 @@ def traverse(
     children = scene.top.nodes[:, bvh.NODE_TEXELS - 1].astype(np.int64)
     inverse = 1.0 / np.where(np.abs(directions) < 1e-20, 1e-20, directions)
     pending = [[(0.0, 0)] for _ in range(count)]
-    waiting = {}  # instance -> rays that enter it in this round
-    active = range(count)
+    waiting: dict[int, list[int]] = {}  # instance -> rays that enter it in this round
+    active = list(range(count))
     while active:
         waiting.clear()
         for ray in active:

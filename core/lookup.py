@@ -132,7 +132,7 @@ def _sample_moments(depth: np.ndarray, nodes: np.ndarray, directions: np.ndarray
     position = (octahedral_encode(directions) * 0.5 + 0.5) * DEPTH_EDGE - 0.5
     corner = np.floor(position).astype(int)
     blend = position - corner
-    result = 0.0
+    result = np.zeros((*nodes.shape, 2))
     for step in np.ndindex(2, 2):
         texel = _wrap_octahedral(corner + step)
         weight = np.where(step, blend, 1 - blend).prod(axis=-1)

@@ -201,6 +201,7 @@ class ReferenceBake:
 
 def bake(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, offset: np.ndarray | None = None) -> Field:
     """The field after ``settings.bounces`` bounces, which must be given: the reference does not judge convergence."""
+    assert settings.bounces is not None
     job = ReferenceBake(snapshot, grid, settings, offset)
     surfaces = job.capture()
     patch = job.bind(surfaces)

@@ -44,7 +44,7 @@ def extract_suns(world: World) -> tuple[World, list[Light]]:
     power = excess @ LUMINANCE
     free = np.ones(len(bright), bool)
     rest = radiance.copy()
-    suns = []
+    suns: list[Light] = []
     while free.any() and len(suns) < _MOST_SUNS:
         brightest = int(np.argmax(np.where(free, power, -1.0)))
         cosine = directions @ directions[brightest]

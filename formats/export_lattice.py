@@ -92,11 +92,11 @@ def reordered(lattice: Lattice, order: tuple[int, int, int], flips: tuple[bool, 
     signs = np.where(flips, -1.0, 1.0)
     matrix = lattice.grid.matrix.copy()
     matrix[:3, :3] = matrix[:3, list(order)] * signs
-    resolution = tuple(lattice.grid.resolution[axis] for axis in order)
+    nx, ny, nz = (lattice.grid.resolution[axis] for axis in order)
     nodes = np.arange(lattice.grid.count).reshape(lattice.grid.resolution[::-1])  # [k, j, i]
     nodes = nodes.transpose([2 - order[axis] for axis in (2, 1, 0)])
     nodes = nodes[tuple(slice(None, None, -1 if flips[axis] else 1) for axis in (2, 1, 0))].ravel()
-    grid = Grid(matrix, resolution, lattice.grid.name)
+    grid = Grid(matrix, (nx, ny, nz), lattice.grid.name)
     steps = None if lattice.steps is None else lattice.steps[nodes][:, list(order)] * signs[:, None, None]
     return Lattice(grid, lattice.coefficients[nodes], lattice.state[nodes], steps)
 
@@ -104,8 +104,8 @@ def reordered(lattice: Lattice, order: tuple[int, int, int], flips: tuple[bool, 
 def nearest_axes(lattice: Lattice) -> Lattice:
     """The nodes counted along those axes of the box that lie closest to the target's X, Y and Z, in their sense."""
     axes = lattice.grid.matrix[:3, :3] / np.linalg.norm(lattice.grid.matrix[:3, :3], axis=0)
-    order = max(itertools.permutations(range(3)), key=lambda order: sum(abs(axes[a, order[a]]) for a in range(3)))
-    return reordered(lattice, order, tuple(bool(axes[a, order[a]] < 0) for a in range(3)))
+    x, y, z = max(itertools.permutations(range(3)), key=lambda order: sum(abs(axes[a, order[a]]) for a in range(3)))
+    return reordered(lattice, (x, y, z), (bool(axes[0, x] < 0), bool(axes[1, y] < 0), bool(axes[2, z] < 0)))
 
 
 def right_handed(lattice: Lattice) -> Lattice:
@@ -187,10 +187,10 @@ def thickened(lattice: Lattice) -> Lattice:
     """``lattice`` with at least two nodes along every axis: a single one is doubled, at both faces of the box."""
     for axis, count in enumerate(lattice.grid.resolution):
         if count == 1:
-            resolution = tuple(2 if a == axis else n for a, n in enumerate(lattice.grid.resolution))
+            nx, ny, nz = (2 if a == axis else n for a, n in enumerate(lattice.grid.resolution))
             nodes = np.arange(lattice.grid.count).reshape(lattice.grid.resolution[::-1])
             nodes = np.repeat(nodes, 2, axis=2 - axis).ravel()
-            grid = replace(lattice.grid, resolution=resolution)
+            grid = replace(lattice.grid, resolution=(nx, ny, nz))
             steps = None if lattice.steps is None else lattice.steps[nodes]
             lattice = Lattice(grid, lattice.coefficients[nodes], lattice.state[nodes], steps)
     return lattice

@@ -42,8 +42,8 @@ def _values(rows: list[str], numbers: list[int], name: str) -> np.ndarray:
     try:
         values = np.array([row.split(",") for row in rows], dtype=float)
     except ValueError:
-        values = None
-    if values is None or values.ndim != 2 or values.shape[1] != 6:
+        values = np.empty(0)
+    if values.ndim != 2 or values.shape[1] != 6:
         for row, number in zip(rows, numbers):
             if not _is_row(row):
                 raise InputError(f"{name}, line {number}: '{row[:60]}' is not six numbers {HEADER_IN}")

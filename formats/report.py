@@ -11,7 +11,8 @@ import base64
 import hashlib
 import json
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from dataclasses import field as default
 from html import escape
 from pathlib import Path
 
@@ -35,11 +36,11 @@ class VolumeReport:
 
     field: Field
     name: str = ""
-    energy: list[float] = field(default_factory=list)
-    change: list[float] = field(default_factory=list)
+    energy: list[float] = default(default_factory=list)
+    change: list[float] = default(default_factory=list)
     iterations: int = 0
     converged: bool = True
-    notes: list[str] = field(default_factory=list)
+    notes: list[str] = default(default_factory=list)
 
 
 @dataclass
@@ -52,16 +53,16 @@ class ReportData:
 
     title: str
     volumes: list[VolumeReport]
-    settings: dict = field(default_factory=dict)
+    settings: dict = default(default_factory=dict)
     device: str = ""
     blender: str = ""
     generator: str = ""
-    counts: dict = field(default_factory=dict)
-    seconds: dict[str, float] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
-    images: list[tuple[str, bytes]] = field(default_factory=list)
-    summary: dict = field(default_factory=dict)
+    counts: dict = default(default_factory=dict)
+    seconds: dict[str, float] = default(default_factory=dict)
+    notes: list[str] = default(default_factory=list)
+    warnings: list[str] = default(default_factory=list)
+    images: list[tuple[str, bytes]] = default(default_factory=list)
+    summary: dict = default(default_factory=dict)
 
 
 def write_report(path, report: ReportData) -> None:

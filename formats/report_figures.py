@@ -42,12 +42,12 @@ def curve(
 
     ``threshold`` draws a level with its label.
     """
-    values = np.asarray(values, float)
-    at = np.arange(first, first + len(values))
-    shown = np.isfinite(values) & ((values > 0) if logarithmic else True)
+    every = np.asarray(values, float)
+    at = np.arange(first, first + len(every))
+    shown = np.isfinite(every) & ((every > 0) if logarithmic else True)
     if not shown.any():
         return '<p class="empty">nothing to show</p>'
-    drawn = values[shown]
+    drawn = every[shown]
     reach = np.append(drawn, threshold) if threshold and threshold > 0 else drawn
     if logarithmic:
         low, high = np.floor(np.log10(reach.min())), np.ceil(np.log10(reach.max()))

@@ -99,7 +99,7 @@ def slices_html(field: Field, block: str) -> str:
 
 def _panel(field: Field, quantity: Quantity, shown: bool) -> str:
     nz = field.grid.resolution[2]
-    if quantity.values is None:
+    if quantity.colours is not None:
         colours, scale, hover = quantity.colours, _legend_states() if quantity.key == "state" else "", ""
         if quantity.key == "colour":
             scale = '<p class="legend">brightest probe at white, sRGB</p>'

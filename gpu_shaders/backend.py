@@ -87,8 +87,8 @@ class GpuBackend:
         fitting = max(1, min(layer_limit, budget // (texels * BYTES_PER_TEXEL)))
         self.probes_per_batch = max(fitting // self._portion, 1) * self._portion
         self.probes_in_budget = max(1, budget // (texels * BYTES_PER_TEXEL))
-        self._hits = None
-        self._raster = None
+        self._hits: _Hits | None = None
+        self._raster: RasterCapture | None = None
 
     def _send_world(self, snapshot: SceneSnapshot) -> None:
         """Probes see the world whole; to patches its suns are lamps and rays see the rest."""

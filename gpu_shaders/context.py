@@ -42,13 +42,13 @@ def _render_once() -> None:
         bl_label = "Gridlight context"
         bl_use_gpu_context = True
 
-        def render(self, depsgraph):
+        def render(self, depsgraph):  # type: ignore[override]
             """Nothing to draw: Blender made the context before it called."""
 
     bpy.utils.register_class(ContextEngine)
     scene = bpy.data.scenes.new("Gridlight context")
     try:
-        scene.render.engine = ContextEngine.bl_idname
+        scene.render.engine = ContextEngine.bl_idname  # type: ignore[assignment]
         scene.render.resolution_x = scene.render.resolution_y = 4
         camera = bpy.data.objects.new("Gridlight context", bpy.data.cameras.new("Gridlight context"))
         scene.collection.objects.link(camera)
@@ -56,7 +56,7 @@ def _render_once() -> None:
         bpy.ops.render.render(scene=scene.name)
         data = camera.data
         bpy.data.objects.remove(camera)
-        bpy.data.cameras.remove(data)
+        bpy.data.cameras.remove(data)  # type: ignore[arg-type]
     except RuntimeError as error:  # how bpy.ops reports a render that could not start
         raise NoGpuError(f"no usable GPU context: {error}; install a graphics driver with OpenGL 4.3") from error
     finally:

@@ -84,4 +84,4 @@ class PreviewPass:
         for values in sums:
             values[..., :3] /= np.maximum(values[..., 3:], 1.0)
             values[..., 3] /= samples
-        return tuple(sums)
+        return sums[0], sums[1]

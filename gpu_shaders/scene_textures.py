@@ -41,7 +41,7 @@ class SceneTextures:
                 "objects from rendering or lower their subdivision"
             )
         self._origin = np.asarray(origin, float)
-        self._textures = {}
+        self._textures: dict = {}
         self._build(snapshot)
         self._send_surfaces(snapshot, emitter_density)
         self._send_images(snapshot)

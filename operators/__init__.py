@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the user can do: one subject per module, registered here in order and unregistered in reverse."""
 
-_unregister = []
+_unregister: list = []
 
 
 def _modules() -> tuple:

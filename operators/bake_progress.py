@@ -35,7 +35,8 @@ class Progress:
         self._reached = 0.0
         self._iterations = None if settings.bounces is None else settings.bounces + 1
         self._phase = "read"
-        self._done, self._total = 0, None
+        self._done = 0
+        self._total: int | None = None
         self._started = time.monotonic()
 
     def volume(self, name: str) -> None:

@@ -8,7 +8,7 @@ may change between two steps: the task keeps arrays of its own and knows volumes
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 
 import bpy
 
@@ -111,7 +111,7 @@ class BakeTask:
         for warning in snapshot.warnings:
             self.progress.warn(warning)
         yield
-        bakes = []
+        bakes: list[KeptBake] = []
         for uid, grid, edit in zip(self._volumes, grids, edits):
             self.progress.volume(grid.name)
             bakes.append((yield from self._bake(uid, snapshot, grid, edit)))
@@ -121,7 +121,9 @@ class BakeTask:
             self._store(volume, snapshot, result, shown)
         kept_bakes.keep(dict(zip(self._volumes, bakes)))
 
-    def _bake(self, uid: int, snapshot: SceneSnapshot, grid: Grid, edits: ProbeEdits | None) -> Iterator[None]:
+    def _bake(
+        self, uid: int, snapshot: SceneSnapshot, grid: Grid, edits: ProbeEdits | None
+    ) -> Generator[None, None, KeptBake]:
         """One volume; returns its bake."""
         kept = kept_bakes.take(uid)  # a bake from nothing wants the memory of the one before
         if self._relight and kept is not None and kept.fits(grid, self.settings, edits):

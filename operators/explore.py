@@ -159,8 +159,8 @@ class GRIDLIGHT_OT_explore(bpy.types.Operator):
         now = time.perf_counter()
         seconds, self._moment = now - self._moment, now
         if self._held:
-            way = np.sum([_MOVES[key] for key in self._held], axis=0).clip(-1, 1)
-            self._walker.move(*way.tolist(), seconds * (_RUN if self._runs else 1.0))
+            ahead, right, up = np.sum([_MOVES[key] for key in self._held], axis=0).clip(-1, 1).tolist()
+            self._walker.move(ahead, right, up, seconds * (_RUN if self._runs else 1.0))
         if self._held or self._overlay.is_fading or self._preview.show_rate:
             self._area.tag_redraw()
 

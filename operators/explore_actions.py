@@ -53,7 +53,7 @@ def wall_materials(context: bpy.types.Context, eye: Vector) -> list[bpy.types.Ma
     if marked:
         return marked
     depsgraph = context.evaluated_depsgraph_get()
-    seen = Counter()
+    seen: Counter = Counter()
     for angle in np.arange(_LOOKS) * (2 * np.pi / _LOOKS):
         for rise in (-0.1, 0.1, 0.3):
             direction = Vector((np.cos(angle), np.sin(angle), rise)).normalized()

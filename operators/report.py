@@ -46,7 +46,9 @@ class GRIDLIGHT_OT_report(bpy.types.Operator):
 def _report(title: str, volumes: list[bpy.types.Object]) -> ReportData:
     fields = [load_field(volume) for volume in volumes]
     details = [stored_details(volume) for volume in volumes]
-    counts, seconds, warnings = {}, {}, []
+    counts: dict[str, int] = {}
+    seconds: dict[str, float] = {}
+    warnings: list[str] = []
     for volume, field, detail in zip(volumes, fields, details):
         for name, count in stored_counts(volume).items():
             counts[name] = counts.get(name, 0) + count

@@ -4,7 +4,7 @@
 Panels only draw. What changes data is an operator's work.
 """
 
-_unregister = []
+_unregister: list = []
 
 
 def register():

@@ -80,7 +80,7 @@ def rendered_objects(view_layer: bpy.types.ViewLayer) -> set[int]:
     """``session_uid`` of the objects of ``view_layer`` that neither they themselves nor all their collections keep out
     of renders.
     """
-    rendered = set()
+    rendered: set[int] = set()
     pending = [view_layer.layer_collection]
     while pending:
         layer = pending.pop()

@@ -42,7 +42,7 @@ def _lifted(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, scope: Scope
     """
     if scope is None:
         return find_socket(tree.nodes[socket.node.name].outputs, socket.identifier)
-    path = []  # group nodes from the outside in
+    path: list[str] = []  # group nodes from the outside in
     while scope is not None:
         path.insert(0, scope.node.name)
         scope = scope.parent

@@ -76,7 +76,7 @@ def box(low, high, material: str) -> Solid:
     """The axis-aligned box between corners ``low`` and ``high``."""
     (x0, y0, z0), (x1, y1, z1) = low, high
     vertices = np.array([(x, y, z) for z in (z0, z1) for y in (y0, y1) for x in (x0, x1)], float)
-    faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    faces: list[tuple[int, ...]] = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
     return Solid(vertices, faces, [material] * 6)
 
 

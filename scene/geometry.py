@@ -130,7 +130,8 @@ def _corner_normals(mesh: bpy.types.Mesh, corner_vertices, corners, faces) -> np
 
 
 def _material_slots(mesh: bpy.types.Mesh, faces: np.ndarray) -> np.ndarray:
-    attribute = mesh.attributes.get("material_index")  # absent while every face uses the first slot
+    # Absent while every face uses the first slot.
+    attribute: bpy.types.Attribute | None = mesh.attributes.get("material_index")
     if attribute is None or attribute.domain != "FACE" or attribute.data_type != "INT":
         return np.zeros(len(faces), np.int32)
     return _read(attribute.data, "value", (len(mesh.polygons),), np.int32)[faces]

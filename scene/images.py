@@ -70,7 +70,8 @@ class ImageTable:
             self._notices.append(f"image '{image.name}' is tiled (UDIM): only its first tile is used")
         elif image.source in ("MOVIE", "SEQUENCE"):
             self._notices.append(f"image '{image.name}' is a {image.source.lower()}: only its current frame is used")
-        width, height = image.size  # asking for the size makes Blender load the file
+        size: tuple[int, int] = image.size  # asking for the size makes Blender load the file
+        width, height = size
         if not (width and height and image.has_data):
             self._notices.append(
                 f"image '{image.name}' of {user} is missing: the socket's own value is used instead; "

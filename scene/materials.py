@@ -41,7 +41,7 @@ class MaterialTable:
             own = self.index(material)
             row = self.materials[own]
             self._indices[key] = len(self.materials)
-            self.materials.append(replace(row, emission=tuple(value * intensity for value in row.emission)))
+            self.materials.append(replace(row, emission=_three(value * intensity for value in row.emission)))
             self.domains.append(self.domains[own])
         elif key not in self._indices:
             self._indices[key] = len(self.materials)
@@ -64,7 +64,7 @@ class MaterialTable:
 
     def _closure(self, material: bpy.types.Material) -> Closure:
         if material.node_tree is None or not material.use_nodes:
-            return Closure(constant(material.diffuse_color[:3]), constant(1.0))
+            return Closure(constant(material.diffuse_color[:3]), constant(1.0))  # type: ignore[index]
         evaluator = NodeEvaluator(
             f"material '{material.name}'", self._images, self._notices, material.name, sampler_of(material)
         )
@@ -110,7 +110,7 @@ class MaterialTable:
             Material(
                 name=name,
                 base_color=_color(diffuse),
-                emission=tuple(float(channel) for channel in np.broadcast_to(emission.scale, 3)),
+                emission=_three(np.broadcast_to(emission.scale, 3)),
                 base_image=base_image,
                 alpha_image=alpha_image,
                 emission_image=NO_IMAGE if emission.is_constant else self._add(f"{name} emission", emission, None),
@@ -179,7 +179,12 @@ def _solid_where_opaque(opacity: Value, threshold: float) -> Value:
 
 def _color(value: Value) -> tuple[float, float, float]:
     """The constant factor of a colour; negative reflectances do not exist on a surface."""
-    return tuple(float(channel) for channel in np.maximum(np.broadcast_to(value.scale, 3), 0.0))
+    return _three(np.maximum(np.broadcast_to(value.scale, 3), 0.0))
+
+
+def _three(values) -> tuple[float, float, float]:
+    red, green, blue = (float(value) for value in values)
+    return red, green, blue
 
 
 def _rgba(color: Value, opacity: Value | None) -> np.ndarray:

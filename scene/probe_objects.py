@@ -100,7 +100,7 @@ def read_edits(scene: bpy.types.Scene, volume_object: bpy.types.Object) -> Probe
 
 def edits_of(scene: bpy.types.Scene, grid: Grid) -> ProbeEdits | None:
     """What ``read_edits`` says about the volume that ``grid`` stands for; None where it stands for none as it is."""
-    volume_object = scene.objects.get(grid.name)
+    volume_object: bpy.types.Object | None = scene.objects.get(grid.name)
     if not is_volume(volume_object) or resolution_of(volume_object) != tuple(grid.resolution):
         return None
     return read_edits(scene, volume_object)

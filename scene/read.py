@@ -112,7 +112,8 @@ def _read(scene, view_layer, evaluate, world: World | None = None) -> SceneSnaps
     images = ImageTable(notices)
     materials = MaterialTable(images, notices)
     override = view_layer.material_override
-    parts, object_names = [], []
+    parts = []
+    object_names: list[str] = []
     for group in harvest.groups.values():
         slots = [override] if override else group.materials
         part = _assemble(group, slots, materials, len(object_names), notices)

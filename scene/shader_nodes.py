@@ -276,7 +276,7 @@ def _map_range(evaluator, node, socket, scope):
     return evaluator.per_pixel(
         node,
         scope,
-        lambda *inputs: shader_math.map_range(*inputs, node.interpolation_type, node.clamp),
+        lambda x, a, b, c, d: shader_math.map_range(x, a, b, c, d, node.interpolation_type, node.clamp),
         "Value",
         "From Min",
         "From Max",

@@ -54,13 +54,15 @@ def box_of(item: bpy.types.Object) -> np.ndarray:
 
 def resolution_of(item: bpy.types.Object) -> tuple[int, int, int]:
     """Probes along the volume's own axes."""
-    return tuple(int(count) for count in item.get(RESOLUTION, (2, 2, 2)))
+    nx, ny, nz = (int(count) for count in item.get(RESOLUTION, (2, 2, 2)))
+    return nx, ny, nz
 
 
 def resolution_for(box: np.ndarray, spacing: float) -> tuple[int, int, int]:
     """Probes per axis whose distance comes nearest to ``spacing`` metres in ``box`` (4, 4)."""
     cells = np.rint(2 * np.linalg.norm(box[:3, :3], axis=0) / spacing)
-    return tuple(int(count) for count in np.clip(cells + 1, 2, MAX_RESOLUTION))
+    nx, ny, nz = (int(count) for count in np.clip(cells + 1, 2, MAX_RESOLUTION))
+    return nx, ny, nz
 
 
 def create_volume(scene: bpy.types.Scene, name: str, matrix: np.ndarray, resolution: Sequence[int]) -> bpy.types.Object:

@@ -170,4 +170,5 @@ def _seen_by_diffuse_rays(world: bpy.types.World) -> bpy.types.World:
 
 
 def _rgb(color) -> tuple[float, float, float]:
-    return tuple(float(channel) for channel in color)
+    red, green, blue = (float(channel) for channel in color)
+    return red, green, blue

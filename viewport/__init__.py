@@ -4,7 +4,7 @@
 Nothing here touches the GPU before something is to be drawn.
 """
 
-_unregister = []
+_unregister: list = []
 
 
 def register():

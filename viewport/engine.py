@@ -59,7 +59,7 @@ class GRIDLIGHT_RE_engine(bpy.types.RenderEngine):
         gpu.state.blend_set("NONE")
         self.update_stats("Gridlight", session.message)
 
-    def render(self, depsgraph):
+    def render(self, depsgraph):  # type: ignore[override]
         try:
             self._render(depsgraph)
         except GridlightError as error:

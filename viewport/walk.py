@@ -25,7 +25,7 @@ class Walker:
         camera = space.camera if self._was_camera else None
         if camera is not None:
             to_world = camera.matrix_world.normalized()
-            forward = -to_world.col[2].xyz
+            forward = -to_world.col[2].xyz  # type: ignore[index]
             self.eye = to_world.translation.copy()
             if camera.type == "CAMERA":
                 space.lens = camera.data.lens * VIEW_SENSOR_MM / camera.data.sensor_width

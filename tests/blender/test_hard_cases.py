@@ -269,7 +269,7 @@ def flat_image(name, width, height, color, space="sRGB"):
     image = bpy.data.images.new(name, width, height)
     image.colorspace_settings.name = space
     image.generated_color = (*color, 1.0)
-    image.pixels[:4]  # noqa: B018  makes Blender generate it
+    image.pixels[:4]
     return image
 
 

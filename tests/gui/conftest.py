@@ -10,7 +10,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from session import ROOT, BlenderSession, build_extension, full_blender  # noqa: E402  (found beside this file)
+from session import ROOT, BlenderSession, build_extension, full_blender
 
 
 @pytest.fixture(scope="session")

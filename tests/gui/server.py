@@ -18,7 +18,7 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from person import EXTENSION, Person  # noqa: E402  (beside this file, which is no package)
+from person import EXTENSION, Person
 
 POLL_SECONDS = 0.05
 FIRST_SECONDS = 1.5  # a window that has just appeared takes no notice of clicks
