@@ -46,6 +46,9 @@ def add_arguments(parser, in_blender: bool) -> None:
     )
     parser.add_argument("--no-eevee", action="store_true", help="leave EEVEE out")
     parser.add_argument(
+        "--no-three", action="store_true", help="for pareto: leave three.js out, which needs Chromium and npm"
+    )
+    parser.add_argument(
         "--eevee-samples",
         metavar="N",
         type=int,

@@ -16,14 +16,22 @@ from . import worker
 def measure(request: dict, reporter, should_stop) -> tuple[dict, int]:
     """Measures ``request["peer"]``, reports rows as they are known, and returns (last report, exit status)."""
     # Here and not above: only the one that is asked for loads, and all of them report through this module.
-    from . import bench_measure_frame, bench_measure_pareto, bench_measure_peers, bench_measure_scaling
+    from . import (
+        bench_measure_eevee,
+        bench_measure_frame,
+        bench_measure_pareto,
+        bench_measure_peers,
+        bench_measure_scaling,
+        bench_measure_three,
+    )
 
     measurements = {
         "gridlight": bench_measure_peers.gridlight,
         "cycles": bench_measure_peers.cycles,
-        "eevee": bench_measure_peers.eevee,
+        "eevee": bench_measure_eevee.eevee,
         "reference": bench_measure_peers.reference,
         "scaling": bench_measure_scaling.scaling,
+        "three": bench_measure_three.three,
         "settings": bench_measure_pareto.settings_in_turn,
         "frame": bench_measure_frame.frame,
     }

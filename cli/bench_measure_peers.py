@@ -5,21 +5,16 @@
   (the median of a few).
 * ``cycles``: one panorama per location of the grid, with persistent data. Building the scene and projecting are not
   counted.
-* ``eevee``: Blender's own bake of a light probe volume with the same nodes, cold with GPU context and shaders, then
-  warm.
 * ``reference``: what errors are measured against; not a peer, not timed.
 """
 
 from __future__ import annotations
 
-import os
-import tempfile
 import time
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 
 from ..bake.result import BakeResult
 from ..core import lookup
@@ -41,8 +36,6 @@ from .verify_points import SIX_NORMALS, FreeSpace
 _MOST_WARM, _WARM_SECONDS = 15, 1.5  # warm bakes, until one of the two is reached
 REFERENCE_WIDTH, REFERENCE_HEIGHT = 128, 64
 PEER_SEED, REFERENCE_SEEDS = 1, (1_000_003, 2_000_003)  # panoramas take consecutive seeds: the series never meet
-
-_EEVEE_VALUES = 4 * 3  # that EEVEE keeps per probe, at least: two bands of RGB as 32-bit floats
 
 
 def gridlight(request: dict, reporter, should_stop) -> int:
@@ -198,59 +191,3 @@ def reference(request: dict, reporter, should_stop) -> None:
     perfect = np.stack([project_panorama(image, request["bands"]) for image in np.mean(images, axis=0)])
     report({"series": series, "floor": sh.irradiance(perfect[:, None], SIX_NORMALS).tolist()})
     reporter.finish()
-
-
-def eevee(request: dict, reporter, should_stop) -> None:
-    """Blender's own bake of a light probe volume, cold and warm."""
-    scene = load_scene(request, reporter)
-    grid = bench_scenes.grid_of(request["scene"], read_scene(scene))
-    scene.render.engine = "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
-    item = _eevee_volume(scene, grid, request["samples"])
-    count = grid.count
-    empty = _stored_bytes(item)
-    for run in ("cold", "warm"):
-        if should_stop():
-            raise Cancelled("cancelled")
-        stopwatch = pipeline.Stopwatch()
-        pipeline.start_gpu(reporter, stopwatch)
-        reporter.phase(f"EEVEE volume bake ({run}); it does not say how far it is")
-        with stopwatch.measure("light"):
-            done = bpy.ops.object.lightprobe_cache_bake(subset="ALL")
-        seconds = stopwatch.totals()
-        # The operator also finishes where it has given up, so what it is timed for has to be there.
-        if done != {"FINISHED"} or _stored_bytes(item) - empty < 4 * _EEVEE_VALUES * count:
-            raise InputError("EEVEE's bake ended without a result (--verbose shows Blender's words)")
-        report(
-            {
-                "run": run,
-                "seconds": seconds["total"],
-                "measured": count,
-                "phases": {"setup": seconds["setup"], "bake": seconds["light"]},
-            }
-        )
-        bpy.ops.object.lightprobe_cache_free(subset="ALL")
-    reporter.finish()
-
-
-def _eevee_volume(scene, grid: Grid, samples: int) -> bpy.types.Object:
-    """A light probe volume of EEVEE whose probes stand at the nodes of ``grid``."""
-    data = bpy.data.lightprobes.new("EEVEE volume", "VOLUME")
-    data.resolution_x, data.resolution_y, data.resolution_z = grid.resolution
-    data.bake_samples = samples
-    # EEVEE's probes sit in the middle of cells, ours at their corners: its box is larger by half a cell on every side.
-    counts = np.array(grid.resolution)
-    matrix = grid.matrix.copy()
-    matrix[:3, :3] *= np.where(counts > 1, counts / np.maximum(counts - 1, 1), 1.0)
-    item = bpy.data.objects.new("EEVEE volume", data)
-    item.matrix_world = Matrix(matrix.tolist())
-    scene.collection.objects.link(item)
-    scene.view_layers[0].update()
-    return item
-
-
-def _stored_bytes(item: bpy.types.Object) -> int:
-    """Size of ``item`` in a file, the only sign of a baked volume that Python can see."""
-    with tempfile.TemporaryDirectory(prefix="gridlight-") as folder:
-        path = os.path.join(folder, "item.blend")
-        bpy.data.libraries.write(path, {item})
-        return os.path.getsize(path)

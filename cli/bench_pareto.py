@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from . import bench_chart, bench_table
-from .bench_peers import Peers, cycles_request, panorama_name
+from .bench_peers import Peers, cycles_request, not_measured, panorama_name
 from .bench_run import SCENES, Run
 
 # Added to the settings of the command line; the first is the default, which errors of speed are related to.
@@ -45,9 +45,11 @@ CYCLES_SETTINGS = (
     (128, 64, 64),
     (128, 64, 256),
 )
+THREE_SETTINGS = tuple({"bounces": bounces, "cubemapSize": size} for bounces, size in ((0, 8), (1, 8), (5, 8), (5, 16)))
 EEVEE_SAMPLES = (64, 256, 2048)
 _OUR_SHARE = 0.45  # of a scene's time: the dearest of our settings are left out before peers are
-_OURS, _CYCLES, _EEVEE = "Gridlight", "Cycles panoramas", "EEVEE volume"
+_OURS, _CYCLES, _EEVEE, _THREE = "Gridlight", "Cycles panoramas", "EEVEE volume", "three.js"
+_SOFTWARE = ("llvmpipe", "softpipe", "swrast")  # renderers beside which Chromium's software is the fair one
 
 
 def measure(run: Run) -> dict:
@@ -89,7 +91,10 @@ def _scene(run: Run, name: str) -> dict:
         request = cycles_request(name, panorama, run.args.panoramas, nodes, bands)
         peers.measure(request, _CYCLES, panorama_name(panorama))
     for samples in () if run.args.no_eevee else EEVEE_SAMPLES:
-        peers.measure({"peer": "eevee", "scene": name, "samples": samples}, _EEVEE, f"{samples} samples")
+        request = {"peer": "eevee", "scene": name, "samples": samples, "nodes": nodes}
+        peers.measure(request, _EEVEE, f"{samples} samples")
+    if not run.args.no_three:
+        part["three"] = _three(run, name, nodes, facts["device"], peers)
     peers.relate(facts["scene"]["locations"], peers.rows[0]["seconds"])
     part["best"] = best(peers.rows, part["reference"])
     return part
@@ -125,9 +130,28 @@ def _ours(run: Run, name: str, peers: Peers) -> tuple[dict, list]:
         if not peers.rows:
             return facts, []  # not even the default
         if waiting:
-            failed = {"run": "", "seconds": None, "measured": 0, "phases": {}, "problem": merged["problem"]}
-            peers.add(_OURS, setting_name(waiting.pop(0)), failed, None)
+            peers.add(_OURS, setting_name(waiting.pop(0)), not_measured(merged["problem"]), None)
     return facts, nodes if isinstance(nodes, list) else []
+
+
+def _three(run: Run, name: str, nodes: list, device: str, peers: Peers) -> dict | None:
+    """three.js's own bake; returns its revision and the device it ran on."""
+    request = {
+        "peer": "three",
+        "scene": name,
+        "nodes": nodes,
+        "settings": THREE_SETTINGS,
+        "software": any(word in device.lower() for word in _SOFTWARE),
+        "seconds": max(0.9 * run.limit_s, 1.0),
+    }
+    merged, rows, _ = run.child(request, f"{_THREE}, {len(THREE_SETTINGS)} settings of {name}", optional=True)
+    for row in rows:
+        options = row.pop("options")
+        size = options["cubemapSize"]
+        peers.add(_THREE, f"{size}² faces, {options['bounces']} bounces", row, np.array(row.pop("irradiance")))
+    if "problem" in merged:
+        peers.add(_THREE, "all", not_measured(merged["problem"]), None)
+    return merged.get("three")
 
 
 def setting_name(item: dict) -> str:
@@ -198,6 +222,9 @@ def _part(part: dict) -> list[str]:
             ]
         )
     lines += bench_table.columns(cells, left=3)
+    if part.get("three"):
+        three = part["three"]
+        lines.append(f"three.js r{three['revision']} on {three['device']}; spots stand in for its area lights")
     if part["left_out"]:
         lines.append(f"ours left out for lack of time: {'; '.join(part['left_out'])}")
     for limit, (ours, theirs) in (part.get("best") or {}).items():

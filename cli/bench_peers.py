@@ -40,7 +40,7 @@ def measure(run: Run) -> dict:
         request = cycles_request(GALLERY, panorama, args.panoramas, nodes, settings.bands)
         peers.measure(request, "Cycles panoramas", panorama_name(panorama))
     if not args.no_eevee:
-        request = {"peer": "eevee", "scene": GALLERY, "samples": args.eevee_samples}
+        request = {"peer": "eevee", "scene": GALLERY, "samples": args.eevee_samples, "nodes": nodes}
         peers.measure(request, "EEVEE volume", f"{args.eevee_samples} samples")
     warm_s = next(row["seconds"] for row in own_rows if row["run"] == "warm")
     peers.relate(ours["scene"]["locations"], warm_s)
@@ -76,6 +76,11 @@ def panorama_name(panorama) -> str:
     return f"{width}×{height}, {samples} samples"
 
 
+def not_measured(problem: str) -> dict:
+    """The row of what ended early."""
+    return {"run": "", "seconds": None, "measured": 0, "phases": {}, "problem": problem}
+
+
 class Peers:
     """Collects rows, and per row the irradiance that its error is computed from."""
 
@@ -92,7 +97,7 @@ class Peers:
         """
         merged, runs, _ = self._run.child(request, f"{name}, {setting}", optional=True)
         if "problem" in merged:
-            runs = [*runs, {"run": "", "seconds": None, "measured": 0, "phases": {}, "problem": merged["problem"]}]
+            runs = [*runs, not_measured(merged["problem"])]
         irradiance = np.array(merged["irradiance"]) if "irradiance" in merged else None
         return merged, [self.add(name, setting, run, irradiance) for run in runs]
 

@@ -71,7 +71,7 @@ def _notes(summary: dict) -> list[str]:
             f"Error: relative RMS of irradiance at {reference['nodes']} free nodes, 6 normals, against Cycles {size},",
             f"{reference['seeds']} × {reference['samples']} samples, whose noise is {100 * reference['noise']:.2f} %. "
             f"A perfect {reference['bands']}-band probe has {100 * reference['floor']['relative_rms']:.2f} %.",
-            "EEVEE's probes cannot be read.",
+            "EEVEE's probes cannot be read: its light is that of white cards at the nodes, rendered after the bake.",
         ]
     lines += ["", "Seconds by phase"]
     for row in summary["rows"]:

@@ -22,7 +22,7 @@ from ..core.errors import InputError
 
 SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 HARDWARE = ("--use-angle=gl-egl", "--ignore-gpu-blocklist")
-_CHROMIUM = ("chromium", "chromium-headless-shell", "google-chrome")
+CHROMIUM = ("chromium", "chromium-headless-shell", "google-chrome")
 
 
 def tool(names: tuple[str, ...], package: str) -> str:
@@ -99,7 +99,7 @@ def open_page(
     Raises:
         InputError: Chromium is missing, the page sends nothing within ``limit_s``, or what it sends has an "error".
     """
-    chromium = tool(_CHROMIUM, "chromium")
+    chromium = tool(CHROMIUM, "chromium")
     results: list[dict] = []
     handler = partial(_Handler, directory=str(folder), extra=extra or {}, packages=packages, results=results)
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)

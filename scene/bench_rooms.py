@@ -15,7 +15,7 @@ _HALL_BALLS = 16
 def build_cornell(scene: bpy.types.Scene) -> bpy.types.Scene:
     """A closed room of slabs, 0 .. CORNELL_EDGE_M along every axis inside, with two boxes and an area light."""
     edge, wall = CORNELL_EDGE_M, 0.2
-    colours = {name: _diffuse(name, color) for name, color in (("white", _WHITE), ("red", _RED), ("green", _GREEN))}
+    colours = {name: diffuse_material(name, color) for name, color in (("white", _WHITE), ("red", _RED), ("green", _GREEN))}
     slabs = {
         "Floor": ((-wall, -wall, -wall), (edge + wall, edge + wall, 0), "white"),
         "Ceiling": ((-wall, -wall, edge), (edge + wall, edge + wall, edge + wall), "white"),
@@ -35,7 +35,7 @@ def build_cornell(scene: bpy.types.Scene) -> bpy.types.Scene:
 def build_hall(scene: bpy.types.Scene, triangles: int) -> bpy.types.Scene:
     """A closed hall of HALL_SIZE_M from the origin, with uneven walls and balls, in about ``triangles`` triangles: half
     in the walls, half in the balls. Only how finely they are cut differs, so light and sight stay about the same."""
-    material = _diffuse("plaster", (0.6, 0.55, 0.5))
+    material = diffuse_material("plaster", (0.6, 0.55, 0.5))
     cuts = max(1, round((triangles / 2 / 12) ** 0.5))
     for axis in range(3):
         for side in (0, 1):
@@ -109,14 +109,14 @@ def _add_light(scene, place, size, power: float) -> None:
     scene.collection.objects.link(lamp)
 
 
-def _diffuse(name: str, color) -> bpy.types.Material:
+def diffuse_material(name: str, color) -> bpy.types.Material:
+    """A Principled BSDF that only reflects diffusely: the glTF exporter knows no Diffuse BSDF."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    nodes.clear()
-    shader = nodes.new("ShaderNodeBsdfDiffuse")
-    shader.inputs["Color"].default_value = (*color, 1.0)
-    links.new(shader.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shader.inputs["Base Color"].default_value = (*color, 1.0)
+    shader.inputs["Roughness"].default_value = 1.0
+    shader.inputs["Specular IOR Level"].default_value = 0.0
     return material
 
 

@@ -23,6 +23,9 @@ def _load_package():
 
 _load_package()
 
+# What is measured on this device once stays between test runs, but out of the user's own cache folder.
+os.environ.setdefault("GRIDLIGHT_CACHE", str(ROOT / "tests" / ".pytest_cache" / "gridlight"))
+
 _exit_status = 0
 
 

@@ -115,7 +115,7 @@ function probeSpheres( grid ) {
 
 // Points, spots and suns carry over exactly. three.js casts no shadows from area lights, so a spot of the same power
 // stands in for one: its cone falls off about as the cosine of a flat lamp does. Direct light here is a sketch; light from probes is not.
-function addLamp( group, lamp, radius ) {
+export function addLamp( group, lamp, radius ) {
 
 	const color = new THREE.Color().setRGB( ...lamp.color );
 	let light;

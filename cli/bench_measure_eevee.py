@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""EEVEE's own bake of a light probe volume, for ``bench peers`` and ``bench pareto``.
+
+What it bakes cannot be read from Python. Its light is measured as it is used: white cards at nodes, rendered by EEVEE
+after the bake with nothing else in the scene and no lamps.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from ..core.errors import Cancelled, InputError
+from ..core.grid import Grid
+from ..scene.bench_rooms import diffuse_material
+from ..scene.read import read_scene
+from ..scene.temporary import new_camera, plain_render_settings, render_pixels
+from . import bench_scenes, pipeline
+from .bench_measure import report
+from .bench_measure_peers import load_scene
+from .verify_points import SIX_NORMALS
+
+_EEVEE_VALUES = 4 * 3  # that EEVEE keeps per probe, at least: two bands of RGB as 32-bit floats
+_CARD_M, _CARD_SAMPLES = 0.02, 8
+
+
+def eevee(request: dict, reporter, should_stop) -> None:
+    """The bake of a volume whose probes stand at the grid's nodes, cold and warm; irradiance at ``request["nodes"]``."""
+    scene = load_scene(request, reporter)
+    grid = bench_scenes.grid_of(request["scene"], read_scene(scene))
+    scene.render.engine = "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
+    item = _eevee_volume(scene, grid, request["samples"])
+    count = grid.count
+    empty = _stored_bytes(item)
+    for run in ("cold", "warm"):
+        if should_stop():
+            raise Cancelled("cancelled")
+        stopwatch = pipeline.Stopwatch()
+        pipeline.start_gpu(reporter, stopwatch)
+        reporter.phase(f"EEVEE volume bake ({run}); it does not say how far it is")
+        with stopwatch.measure("light"):
+            done = bpy.ops.object.lightprobe_cache_bake(subset="ALL")
+        seconds = stopwatch.totals()
+        # The operator also finishes where it has given up, so what it is timed for has to be there.
+        if done != {"FINISHED"} or _stored_bytes(item) - empty < 4 * _EEVEE_VALUES * count:
+            raise InputError("EEVEE's bake ended without a result (--verbose shows Blender's words)")
+        report(
+            {
+                "run": run,
+                "seconds": seconds["total"],
+                "measured": count,
+                "phases": {"setup": seconds["setup"], "bake": seconds["light"]},
+            }
+        )
+        if run == "cold":
+            bpy.ops.object.lightprobe_cache_free(subset="ALL")
+    if request["nodes"]:
+        reporter.phase("cards", len(request["nodes"]))
+        report({"irradiance": _irradiance_on_cards(scene, item, request["nodes"], reporter, should_stop).tolist()})
+    reporter.finish()
+
+
+def _eevee_volume(scene, grid: Grid, samples: int) -> bpy.types.Object:
+    """A light probe volume of EEVEE whose probes stand at the nodes of ``grid``."""
+    data = bpy.data.lightprobes.new("EEVEE volume", "VOLUME")
+    data.resolution_x, data.resolution_y, data.resolution_z = grid.resolution
+    data.bake_samples = samples
+    # EEVEE's probes sit in the middle of cells, ours at their corners: its box is larger by half a cell on every side.
+    counts = np.array(grid.resolution)
+    matrix = grid.matrix.copy()
+    matrix[:3, :3] *= np.where(counts > 1, counts / np.maximum(counts - 1, 1), 1.0)
+    item = bpy.data.objects.new("EEVEE volume", data)
+    item.matrix_world = Matrix(matrix.tolist())
+    scene.collection.objects.link(item)
+    scene.view_layers[0].update()
+    return item
+
+
+def _irradiance_on_cards(scene, item, nodes, reporter, should_stop) -> np.ndarray:
+    """(N, 6, 3) irradiance at ``nodes`` (N, 3): white cards there, lit by the volume ``item`` alone, as EEVEE renders
+    them."""
+    for thing in scene.objects:
+        thing.hide_render = thing != item
+    scene.world = None
+    # Where and from where to look the light up: at the card itself.
+    item.data.normal_bias = item.data.view_bias = item.data.facing_bias = 0.0
+    mesh = bpy.data.meshes.new("Card")
+    edge = _CARD_M / 2
+    mesh.from_pydata([(-edge, -edge, 0), (edge, -edge, 0), (edge, edge, 0), (-edge, edge, 0)], [], [(0, 1, 2, 3)])
+    mesh.materials.append(diffuse_material("Card", (1.0, 1.0, 1.0)))
+    card = bpy.data.objects.new("Card", mesh)
+    scene.collection.objects.link(card)
+    plain_render_settings(scene)
+    camera = scene.camera = new_camera(scene)
+    camera.data.type, camera.data.ortho_scale = "ORTHO", edge
+    camera.data.clip_start, camera.data.clip_end = _CARD_M / 10, 10 * _CARD_M
+    scene.render.resolution_x = scene.render.resolution_y = 8
+    scene.eevee.taa_render_samples = _CARD_SAMPLES
+    scene.eevee.use_raytracing = False
+    found = np.empty((len(nodes), len(SIX_NORMALS), 3))
+    for index, node in enumerate(nodes):
+        for side, normal in enumerate(SIX_NORMALS):
+            if should_stop():
+                raise Cancelled("cancelled")
+            turn = Vector(normal).to_track_quat("Z", "Y").to_matrix().to_4x4()  # cards face +Z, cameras look along −Z
+            card.matrix_world = Matrix.Translation(Vector(node)) @ turn
+            camera.matrix_world = Matrix.Translation(Vector(node) + Vector(normal) * _CARD_M) @ turn
+            pixels = render_pixels(scene, scene.view_layers[0].name)
+            found[index, side] = np.pi * pixels.reshape(-1, 3).mean(axis=0)
+        reporter.advance()
+    return found
+
+
+def _stored_bytes(item: bpy.types.Object) -> int:
+    """Size of ``item`` in a file, the only sign of a baked volume that Python can see."""
+    with tempfile.TemporaryDirectory(prefix="gridlight-") as folder:
+        path = os.path.join(folder, "item.blend")
+        bpy.data.libraries.write(path, {item})
+        return os.path.getsize(path)
