@@ -29,7 +29,7 @@ _CARD_M, _CARD_SAMPLES = 0.02, 8
 
 
 def eevee(request: dict, reporter, should_stop) -> None:
-    """The bake of a volume whose probes stand at the grid's nodes, cold and warm; irradiance at ``request["nodes"]``."""
+    """The bake of a volume whose probes stand at the grid's nodes, cold and warm; irradiance at the request's nodes."""
     scene = load_scene(request, reporter)
     grid = bench_scenes.grid_of(request["scene"], read_scene(scene))
     scene.render.engine = "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"

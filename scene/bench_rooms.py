@@ -15,7 +15,8 @@ _HALL_BALLS = 16
 def build_cornell(scene: bpy.types.Scene) -> bpy.types.Scene:
     """A closed room of slabs, 0 .. CORNELL_EDGE_M along every axis inside, with two boxes and an area light."""
     edge, wall = CORNELL_EDGE_M, 0.2
-    colours = {name: diffuse_material(name, color) for name, color in (("white", _WHITE), ("red", _RED), ("green", _GREEN))}
+    tints = {"white": _WHITE, "red": _RED, "green": _GREEN}
+    colours = {name: diffuse_material(name, color) for name, color in tints.items()}
     slabs = {
         "Floor": ((-wall, -wall, -wall), (edge + wall, edge + wall, 0), "white"),
         "Ceiling": ((-wall, -wall, edge), (edge + wall, edge + wall, edge + wall), "white"),
