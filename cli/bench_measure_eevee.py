@@ -25,7 +25,7 @@ from .bench_measure_peers import load_scene
 from .verify_points import SIX_NORMALS
 
 _EEVEE_VALUES = 4 * 3  # that EEVEE keeps per probe, at least: two bands of RGB as 32-bit floats
-_CARD_M, _CARD_SAMPLES = 0.02, 8
+_PICTURE, _CARD_PIXELS, _CARD_SAMPLES = 640, 7, 4  # cards are so small that they do not cover each other
 
 
 def eevee(request: dict, reporter, should_stop) -> None:
@@ -59,8 +59,9 @@ def eevee(request: dict, reporter, should_stop) -> None:
         if run == "cold":
             bpy.ops.object.lightprobe_cache_free(subset="ALL")
     if request["nodes"]:
-        reporter.phase("cards", len(request["nodes"]))
-        report({"irradiance": _irradiance_on_cards(scene, item, request["nodes"], reporter, should_stop).tolist()})
+        reporter.phase("cards", len(SIX_NORMALS))
+        nodes = np.array(request["nodes"])
+        report({"irradiance": _irradiance_on_cards(scene, item, nodes, reporter, should_stop).tolist()})
     reporter.finish()
 
 
@@ -80,39 +81,70 @@ def _eevee_volume(scene, grid: Grid, samples: int) -> bpy.types.Object:
     return item
 
 
-def _irradiance_on_cards(scene, item, nodes, reporter, should_stop) -> np.ndarray:
+def _irradiance_on_cards(scene, item, nodes: np.ndarray, reporter, should_stop) -> np.ndarray:
     """(N, 6, 3) irradiance at ``nodes`` (N, 3): white cards there, lit by the volume ``item`` alone, as EEVEE renders
-    them."""
+    them; one picture of all cards for each of six normals."""
     for thing in scene.objects:
         thing.hide_render = thing != item
     scene.world = None
     # Where and from where to look the light up: at the card itself.
     item.data.normal_bias = item.data.view_bias = item.data.facing_bias = 0.0
-    mesh = bpy.data.meshes.new("Card")
-    edge = _CARD_M / 2
-    mesh.from_pydata([(-edge, -edge, 0), (edge, -edge, 0), (edge, edge, 0), (-edge, edge, 0)], [], [(0, 1, 2, 3)])
-    mesh.materials.append(diffuse_material("Card", (1.0, 1.0, 1.0)))
-    card = bpy.data.objects.new("Card", mesh)
-    scene.collection.objects.link(card)
     plain_render_settings(scene)
     camera = scene.camera = new_camera(scene)
-    camera.data.type, camera.data.ortho_scale = "ORTHO", edge
-    camera.data.clip_start, camera.data.clip_end = _CARD_M / 10, 10 * _CARD_M
-    scene.render.resolution_x = scene.render.resolution_y = 8
+    camera.data.type = "ORTHO"
+    scene.render.resolution_x = scene.render.resolution_y = _PICTURE
     scene.eevee.taa_render_samples = _CARD_SAMPLES
     scene.eevee.use_raytracing = False
+    middle = (nodes.min(axis=0) + nodes.max(axis=0)) / 2
+    reach = float(np.linalg.norm(nodes - middle, axis=1).max()) + 1.0
+    pixel = 2.2 * reach / _PICTURE
+    cards = _cards(scene, nodes, _CARD_PIXELS * pixel)
+    camera.data.ortho_scale = _PICTURE * pixel
+    camera.data.clip_start, camera.data.clip_end = 0.01 * reach, 4 * reach
     found = np.empty((len(nodes), len(SIX_NORMALS), 3))
-    for index, node in enumerate(nodes):
-        for side, normal in enumerate(SIX_NORMALS):
-            if should_stop():
-                raise Cancelled("cancelled")
-            turn = Vector(normal).to_track_quat("Z", "Y").to_matrix().to_4x4()  # cards face +Z, cameras look along −Z
-            card.matrix_world = Matrix.Translation(Vector(node)) @ turn
-            camera.matrix_world = Matrix.Translation(Vector(node) + Vector(normal) * _CARD_M) @ turn
-            pixels = render_pixels(scene, scene.view_layers[0].name)
-            found[index, side] = np.pi * pixels.reshape(-1, 3).mean(axis=0)
+    for side, normal in enumerate(SIX_NORMALS):
+        if should_stop():
+            raise Cancelled("cancelled")
+        turn = Vector(normal).to_track_quat("Z", "Y")  # cards face +Z, cameras look along −Z
+        for card in cards:
+            card.rotation_euler = turn.to_euler()
+        view, places = _view(nodes - middle, np.array(turn.to_matrix()))
+        camera.matrix_world = Matrix.Translation(Vector(middle + 2 * reach * view[:, 2])) @ Matrix(view).to_4x4()
+        column, row = np.floor(places / pixel + _PICTURE / 2).astype(int).T
+        pixels = render_pixels(scene, scene.view_layers[0].name)
+        found[:, side] = np.pi * pixels[row, column]
         reporter.advance()
     return found
+
+
+def _cards(scene, nodes: np.ndarray, edge_m: float) -> list[bpy.types.Object]:
+    """A white square at each of ``nodes`` (N, 3), as wide as ``edge_m``."""
+    mesh = bpy.data.meshes.new("Card")
+    half = edge_m / 2
+    mesh.from_pydata([(-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)], [], [(0, 1, 2, 3)])
+    mesh.materials.append(diffuse_material("Card", (1.0, 1.0, 1.0)))
+    cards = []
+    for node in nodes:
+        card = bpy.data.objects.new("Card", mesh)
+        card.location = node
+        scene.collection.objects.link(card)
+        cards.append(card)
+    return cards
+
+
+def _view(offsets: np.ndarray, card: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Axes (3, 3) of a camera that sees the front of cards with axes ``card`` (3, 3), columns right, up, back, and
+    where it sees ``offsets`` (N, 3) in its picture, (N, 2). Of some slanted views the one that keeps cards apart most.
+    """
+    best = None
+    for u, v in np.random.default_rng(0).uniform(-0.4, 0.4, (50, 2)):
+        back = card @ np.array([u, v, 1.0])
+        axes = np.array(Vector(back).to_track_quat("Z", "Y").to_matrix())
+        places = offsets @ axes[:, :2]
+        apart = np.linalg.norm(places[:, None] - places, axis=2) + np.diag(np.full(len(places), np.inf))
+        if best is None or apart.min() > best[0]:
+            best = (apart.min(), axes, places)
+    return best[1:]
 
 
 def _stored_bytes(item: bpy.types.Object) -> int:
