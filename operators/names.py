@@ -25,5 +25,4 @@ IMPORT = "gridlight.import_field"
 REPORT = "gridlight.report"
 
 CATEGORY = "Gridlight"  # the sidebar's tab
-PANEL_PREFIX = "GRIDLIGHT_PT_"
 LIGHT_LIST = "GRIDLIGHT_UL_lights"

@@ -41,7 +41,7 @@ def store_field(volume_object: bpy.types.Object, field: Field, scene_hash: str, 
     """Keeps ``field`` as the light of ``volume_object``, instead of what it had.
 
     Args:
-        scene_hash: of the scene that was baked, see ``formats.probe_metadata.scene_hash``; ``is_stale`` compares it.
+        scene_hash: of the scene that was baked, see ``formats.probe_metadata.scene_hash``; operators/stale.py compares it.
         details: what is worth knowing about this bake but does not belong into probe files, such as times; plain JSON.
     """
     text = stored_text(volume_object)
@@ -133,15 +133,6 @@ def has_moved(volume_object: bpy.types.Object) -> bool:
     size = np.linalg.norm(grid.matrix[:3, :3])
     same_box = np.abs(grid.matrix - box_of(volume_object)).max() <= _SAME_PLACE * size
     return not (same_box and tuple(grid.resolution) == resolution_of(volume_object))
-
-
-def is_stale(volume_object: bpy.types.Object, scene_hash: str) -> bool:
-    """Whether the light of ``volume_object`` belongs to another scene, box or grid than there are now.
-
-    ``scene_hash`` is that of the scene now. A volume without light is not stale.
-    """
-    metadata = stored_metadata(volume_object)
-    return metadata is not None and (metadata["scene_hash"] != scene_hash or has_moved(volume_object))
 
 
 def _stored_grid(text: bpy.types.Text, name: str) -> Grid:
