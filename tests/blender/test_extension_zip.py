@@ -65,6 +65,7 @@ def test_every_platform_gets_its_own_wheels_and_nothing_else(zips, manifest):
             "blender_manifest.toml",
         }
         assert {path.suffix for path in sources} <= SUFFIXES | {".toml", ""}
+        assert not [path for path in sources if "bench" in str(path)]  # a developer's tools
 
 
 def test_the_same_files_give_the_same_bytes(zips, tmp_path):
