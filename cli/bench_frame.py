@@ -66,12 +66,11 @@ def _shader_table(summary: dict) -> list[str]:
     lines = [
         f"Per shader, of a relight that takes {_ms(summary['profiled_seconds'])} ms with a wait after every dispatch; "
         f"a wait with nothing to do takes {_ms(limits['wait_seconds'])}, which is part of every dispatch.",
-        "MB: of all arrays and images that dispatches are given, each counted once, whatever of it they read and how "
-        "often. Share: of the",
-        f"{limits['copy_bytes_per_second'] / 1e9:.4g} GB/s that copying reaches here, waits taken off. Operations: what "
-        f"arithmetic alone, at the {limits['operations_per_second'] / 1e12:.3g} T/s that it reaches here,",
-        "would do for each of these bytes in the time that the dispatch takes; one that does fewer is bound by neither, "
-        "but by latency or by too few threads.",
+        "MB: of all arrays and images that dispatches are given, each once, whatever of it they read and how often.",
+        f"Share: of the {limits['copy_bytes_per_second'] / 1e9:.4g} GB/s that copying reaches here, waits taken off.",
+        "Operations: what arithmetic alone could do for each of these bytes in the time that the dispatch takes, at",
+        f"the {limits['operations_per_second'] / 1e12:.3g} T/s that it reaches here. What does fewer is bound by "
+        "latency or by too few threads.",
     ]
     cells = [["shader", "dispatches", "ms", "without waits", "groups", "MB", "GB/s", "share", "operations"]]
     ordered = sorted(summary["shaders"].items(), key=lambda item: -item[1]["seconds"])

@@ -244,6 +244,6 @@ def _slowest(stats: pstats.Stats, count: int) -> list[dict]:
             "own_seconds": own / count,
             "whole_seconds": whole / count,
         }
-        for (file, _line, name), (_, calls, own, whole, _callers) in stats.stats.items()
+        for (file, _line, name), (_, calls, own, whole, _callers) in vars(stats)["stats"].items()
     ]
     return sorted(rows, key=lambda row: -row["own_seconds"])[:_FUNCTIONS]

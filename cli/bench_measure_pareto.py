@@ -59,7 +59,8 @@ def settings_in_turn(request: dict, reporter, should_stop) -> None:
             report({"nodes": nodes.tolist()})
         irradiance, counts, capture = irradiance_at(result.field, np.array(nodes)), result.counts, result.capture
         iterations, converged = result.iterations, result.converged
-        warm, again = [], time.perf_counter()
+        warm: list[float] = []
+        again = time.perf_counter()
         while first < _MOST_AGAIN_SECONDS and (
             not warm or (len(warm) < _MOST_RUNS and time.perf_counter() - again < _REPEAT_SECONDS)
         ):

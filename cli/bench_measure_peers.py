@@ -22,7 +22,6 @@ from ..core import spherical_harmonics as sh
 from ..core.conventions import ACTIVE
 from ..core.errors import Cancelled, InputError
 from ..core.field import Field
-from ..core.grid import Grid
 from ..core.panorama import panorama_irradiance, project_panorama
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
@@ -44,7 +43,8 @@ def gridlight(request: dict, reporter, should_stop) -> int:
     settings = BakeSettings(**request["settings"])
     cold = _bake_once(scene, request["scene"], settings, "cold", reporter, should_stop)
     report(cold.row)
-    cold, warm, started = None, [], time.perf_counter()  # a bake's textures are freed before the next starts
+    warm: list[dict] = []
+    cold, started = None, time.perf_counter()  # a bake's textures are freed before the next starts
     while not warm or (len(warm) < _MOST_WARM and time.perf_counter() - started < _WARM_SECONDS):
         last = None
         last = _bake_once(scene, request["scene"], settings, "warm", reporter, should_stop)

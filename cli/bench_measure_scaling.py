@@ -12,6 +12,7 @@ from ..bake.session import BakeSession
 from ..core.errors import GridlightError
 from ..core.grid import Grid
 from ..core.settings import BakeSettings
+from ..core.snapshot import SceneSnapshot
 from ..gpu_shaders.context import device_description, ensure_context
 from ..scene.bench_rooms import HALL_SIZE_M, build_hall
 from ..scene.read import read_scene
@@ -37,7 +38,7 @@ def scaling(request: dict, reporter, should_stop) -> None:
     ensure_context()
     bake = _Bakes(request["settings"], should_stop)
     report({"device": device_description(), "blender": _blender(), "context_seconds": time.perf_counter() - started})
-    running = {sweep["name"]: (sweep, []) for sweep in request["sweeps"]}
+    running: dict[str, tuple[dict, list]] = {sweep["name"]: (sweep, []) for sweep in request["sweeps"]}
     for turn in range(max(len(sweep["sizes"]) for sweep in request["sweeps"])):
         for name, (sweep, done) in list(running.items()):
             if turn >= len(sweep["sizes"]):
@@ -84,7 +85,8 @@ class _Bakes:
     def __init__(self, settings: dict, should_stop):
         self._settings = settings
         self._should_stop = should_stop
-        self._triangles, self._snapshot, self._read_seconds = 0, None, 0.0
+        self._triangles, self._read_seconds = 0, 0.0
+        self._snapshot: SceneSnapshot | None = None
         self._warm: dict[tuple, float] = {}
 
     def __call__(self, case: dict, capture: str) -> tuple[dict, float]:
@@ -96,7 +98,8 @@ class _Bakes:
             self._warm[variant] = self._bake({**case, "probes": 30}, capture)["seconds"]
             report({"cold": {"face": case["face"], "capture": capture, "seconds": self._warm[variant]}})
         self._read(case["triangles"])
-        runs, begun = [], time.perf_counter()
+        runs: list[dict] = []
+        begun = time.perf_counter()
         while not runs or (len(runs) < _MOST_RUNS and time.perf_counter() - begun < _REPEAT_SECONDS):
             runs.append(self._bake(case, capture))
         row = median_row(runs)
@@ -138,10 +141,6 @@ def resolution_for(probes: int) -> tuple[int, int, int]:
     """Counts along the hall's axes that give about ``probes`` in cells as cubic as they get."""
     size = HALL_SIZE_M - 2 * _INSET_M
     step = (np.prod(size) / probes) ** (1 / 3)
-    best = None
-    for factor in np.linspace(0.7, 1.6, 200):
-        counts = tuple(int(count) for count in np.maximum(np.rint(size / (step * factor)) + 1, 2))
-        miss = abs(np.log(np.prod(counts) / probes))
-        if best is None or miss < best[0]:
-            best = (miss, counts)
-    return best[1]
+    tried = [np.maximum(np.rint(size / (step * factor)) + 1, 2).astype(int) for factor in np.linspace(0.7, 1.6, 200)]
+    nx, ny, nz = min(tried, key=lambda counts: abs(np.log(np.prod(counts) / probes))).tolist()
+    return nx, ny, nz

@@ -14,7 +14,7 @@ from .bench_peers import Peers, cycles_request, not_measured, panorama_name
 from .bench_run import SCENES, Run
 
 # Added to the settings of the command line; the first is the default, which errors of speed are related to.
-OUR_SETTINGS = (
+OUR_SETTINGS: tuple[dict, ...] = (
     {},
     {"face": 8},
     {"face": 12},
@@ -107,7 +107,8 @@ def _ours(run: Run, name: str, peers: Peers) -> tuple[dict, list]:
     """
     waiting = [dict(item) for item in OUR_SETTINGS]
     ends = time.perf_counter() + _OUR_SHARE * run.left_s
-    facts, nodes = {}, run.args.error_nodes
+    facts: dict = {}
+    nodes = run.args.error_nodes
     while waiting:
         request = {
             "peer": "settings",

@@ -15,7 +15,6 @@ from ..core.errors import InputError, NoGpuError
 from ..formats.probe_metadata import program_version
 from . import bake, bench_machine, bench_process, system_libraries
 
-
 SCENES = ("gallery", "cornell")  # that bench_scenes builds; other names are those of files
 _LEAST_SECONDS = 3.0  # below which starting a process is not worth it
 
@@ -66,6 +65,7 @@ class Run:
         options = ["--quiet"] if args.quiet else []
         self.reporter.note(what)
         limit_s = self.limit_s
+        reports: list[dict]
         spent = self.left_s < _LEAST_SECONDS
         if spent:
             reports, problem = [], "left out: the time of --budget is spent"

@@ -59,6 +59,14 @@ def install_packages(folder: Path, limit_s: float = 300.0) -> Path:
     return stamp.parent
 
 
+class _Server(http.server.ThreadingHTTPServer):
+    """``arrived`` is set when the page has posted its result."""
+
+    def __init__(self, handler):
+        super().__init__(("127.0.0.1", 0), handler)
+        self.arrived = threading.Event()
+
+
 class _Handler(http.server.SimpleHTTPRequestHandler):
     """Serves a folder and the packages; takes one result; answers extra paths from ``extra``."""
 
@@ -77,7 +85,8 @@ class _Handler(http.server.SimpleHTTPRequestHandler):
         self.send_response(204)
         self.end_headers()
         self._results.append(json.loads(body))
-        self.server.arrived.set()
+        if isinstance(self.server, _Server):
+            self.server.arrived.set()
 
     def log_message(self, *_):
         pass
@@ -102,8 +111,7 @@ def open_page(
     chromium = tool(CHROMIUM, "chromium")
     results: list[dict] = []
     handler = partial(_Handler, directory=str(folder), extra=extra or {}, packages=packages, results=results)
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    server.arrived = threading.Event()
+    server = _Server(handler)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     with tempfile.TemporaryDirectory(prefix="gridlight-browser-", ignore_cleanup_errors=True) as profile:
         command = [

@@ -15,6 +15,9 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
+
+Kept = TypeVar("Kept")
 
 
 def folder() -> Path:
@@ -31,7 +34,7 @@ def folder() -> Path:
     return Path(base).expanduser() / "gridlight"
 
 
-def kept(name: str, key: str, check: Callable[[dict], object], measure: Callable[[], dict]) -> tuple[object, bool]:
+def kept(name: str, key: str, check: Callable[[dict], Kept], measure: Callable[[], dict]) -> tuple[Kept, bool]:
     """What ``check`` makes of the values kept as ``name`` for ``key``, else of what ``measure`` returns, which is kept.
 
     Args:
@@ -59,7 +62,7 @@ def kept(name: str, key: str, check: Callable[[dict], object], measure: Callable
 _DAMAGE = (ValueError, TypeError, KeyError)
 
 
-def _read(path: Path, key: str, check: Callable[[dict], object]) -> object:
+def _read(path: Path, key: str, check: Callable[[dict], Kept]) -> Kept:
     """Raises OSError where there is no file, one of _DAMAGE where it is none of ours."""
     content = json.loads(path.read_text(encoding="utf-8"))
     if content["key"] != key:

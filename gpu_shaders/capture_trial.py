@@ -49,7 +49,7 @@ class _Trial:
 
     def seconds(self, method: str, probes: int) -> float:
         """The fastest of a few captures after one that compiles and allocates."""
-        times = []
+        times: list[float] = []
         while len(times) < _LEAST_RUNS or (len(times) < _MOST_RUNS and sum(times) < _ENOUGH_SECONDS):
             start = time.perf_counter()
             self._backend.find_hits(0, probes, method)

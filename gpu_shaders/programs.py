@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import gpu
 
@@ -20,7 +22,7 @@ _programs: dict[tuple, gpu.types.GPUShader] = {}
 
 # Called with (name, shader) for every program that is asked for; what it returns takes the shader's place. For
 # measurements alone (dispatch_profile.py).
-observer = None
+observer: Callable[[str, gpu.types.GPUShader], Any] | None = None
 
 
 def program(name: str, **defines) -> gpu.types.GPUShader:

@@ -36,7 +36,15 @@ def test_other_keys_have_other_values():
 
 @pytest.mark.parametrize(
     "damage",
-    ["", "{", "[]", "null", '{"key": "device"}', '{"key": "device", "values": {}}', '{"key": 1, "values": {"number": 1}}'],
+    [
+        "",
+        "{",
+        "[]",
+        "null",
+        '{"key": "device"}',
+        '{"key": "device", "values": {}}',
+        '{"key": 1, "values": {"number": 1}}',
+    ],
 )
 def test_damaged_files_are_measured_anew(cache, damage):
     user_cache.kept("speed", "device", number, lambda: {"number": 3})
