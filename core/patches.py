@@ -15,7 +15,8 @@ s is a share of the probes' spacing and grows with the distance from the volume.
 gets cells as small as the view demands (ANGLE), so patches are about equally small in every probe's sight. Rays
 between patches end on cells of the plain size.
 
-Everything here is deterministic: patches are numbered in the order in which hits are bound.
+Everything here is deterministic: the leader of a patch is the first of its hits, and patches are numbered in the order
+of their leaders. gpu_shaders/patch_finder.py does the same on the GPU.
 """
 
 from __future__ import annotations
@@ -41,10 +42,12 @@ _MOST_EFFORT = 256
 _UNEVEN = (0.6, 3.0)  # error of four points, of the mean light, from which on the second and third number is taken
 _CELL_SHARE = 0.25  # of the grid's shortest spacing: edge of plain cells
 _LEAST_CELLS = 32  # plain cells along the diagonal of the volume's box
-_VARIANTS = 3  # patches of one cell that do not see each other; hits beyond join the last
+VARIANTS = 3  # patches of one cell that do not see each other; hits beyond join the last
 _FINEST = -10  # level: cells of 2⁻¹⁰ of the plain size
 _SHIFT = 0.37  # of a cell: walls tend to lie at round numbers
 _AXIS_BITS = 18
+_SCRAMBLE, _UNSCRAMBLE = np.uint32(0x9E3779B1), np.uint32(0x0E8B2F51)  # inverse to each other modulo 2³²
+_NOBODY = np.uint32(0xFFFFFFFF)
 MOST_ROUNDS = 12  # of rays that find surface which nothing has seen before
 _COARSEST = 3  # levels by which patches grow that only rays see
 
@@ -76,12 +79,13 @@ def light_parts(lamps: int, has_emitters: bool) -> list[Part]:
     return [*parts, EMITTERS] if has_emitters else parts
 
 
-class Patches:
-    """All patches of a bake. Positions are metres relative to the grid's origin.
+def coarser_by(round_: int) -> int:
+    """Levels by which cells grow for what only rays of a round see."""
+    return min(round_, _COARSEST)
 
-    ``points`` (N, POINTS, 4) float32: position and packed normal; the first is the leader, which every hit of the
-    patch sees. ``seen`` (N,) bool: a texel of a probe lies on it.
-    """
+
+class CellRule:
+    """Which cell a hit lies in. Positions are metres relative to the grid's origin."""
 
     def __init__(self, grid: Grid):
         spacing = grid.cell_size()
@@ -93,68 +97,16 @@ class Patches:
         self._to_box = np.linalg.inv(grid.matrix[:3, :3]).astype(np.float32)
         self._half = np.linalg.norm(grid.matrix[:3, :3], axis=0).astype(np.float32)
         self._middle = (grid.center - grid.origin).astype(np.float32)  # of the box, in the frame of hits
-        self._keys = [np.zeros(0, np.uint64) for _ in range(_VARIANTS)]  # sorted
-        self._ids = [np.zeros(0, np.int64) for _ in range(_VARIANTS)]
-        self.points = np.zeros((0, POINTS, 4), np.float32)
-        self.seen = np.zeros(0, bool)
 
-    @property
-    def count(self) -> int:
-        return len(self.points)
+    def rows(self) -> np.ndarray:
+        """(5, 4) float32 as patch_keys_comp.glsl reads it."""
+        rows = np.zeros((5, 4), np.float32)
+        rows[:3, :3], rows[:3, 3] = self._to_box, self._half
+        rows[3] = self.cell, 2.0**_FINEST, _SHIFT, self._angle
+        rows[4, :3] = self._middle
+        return rows
 
-    def bind(
-        self,
-        hits: np.ndarray,
-        view_distance: np.ndarray | None,
-        sees: Callable[[np.ndarray, np.ndarray], np.ndarray],
-        found: bool = True,
-        coarser: int = 0,
-    ) -> np.ndarray:
-        """(H,) patch of each of ``hits`` (H, 4), position and packed normal; NO_PATCH for hits with a negative one.
-        Patches that are missing are founded, or left NO_PATCH without ``found``.
-
-        ``view_distance`` (H,) metres to the probe whose texels the hits are; None for ends of rays between patches.
-        ``sees(items, patches)`` tells which hits (by number) see the leader of a patch.
-        """
-        result = np.full(len(hits), NO_PATCH, np.int64)
-        pending = np.flatnonzero(hits[:, 3] >= 0)
-        keys = self._cell_keys(hits[pending], None if view_distance is None else view_distance[pending], coarser)
-        first_new = self.count
-        for variant in range(_VARIANTS):
-            if not len(pending):
-                break
-            unique, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
-            known = self._known(variant, unique)
-            if found:
-                self._found(variant, unique, known, hits[pending[first]])
-            ids = known[inverse]
-            joined = (ids >= first_new) & (first[inverse] == np.arange(len(pending)))  # a leader sees itself
-            ask = np.flatnonzero((ids >= 0) & ~joined)
-            if len(ask):
-                joined[ask] = sees(pending[ask], ids[ask]) if variant < _VARIANTS - 1 else True
-            result[pending[joined]] = ids[joined]
-            pending, keys = pending[~joined], keys[~joined]
-        if view_distance is not None:
-            self.seen[result[result >= 0]] = True
-        if found:
-            self._choose_points(first_new, hits, result)
-        return result
-
-    def bind_ends(
-        self, hits: np.ndarray, round_: int, sees: Callable[[np.ndarray, np.ndarray], np.ndarray]
-    ) -> np.ndarray:
-        """(H,) patches on which rays of a round end, NOTHING for ``hits`` (H, 4) without surface, where no light comes
-        back. What only rays see gets the coarser patches the more rays it takes to see it, in the last round none."""
-        ends = self.bind(hits, None, sees, found=round_ == 0)
-        lost = (ends == NO_PATCH) & (hits[:, 3] >= 0)
-        ends[hits[:, 3] < 0] = NOTHING
-        if lost.any() and 0 < round_ < MOST_ROUNDS - 1:
-            alone = hits.copy()
-            alone[~lost, 3] = -1.0
-            ends[lost] = self.bind(alone, None, sees, coarser=min(round_, _COARSEST))[lost]
-        return ends
-
-    def _cell_keys(self, hits: np.ndarray, view_distance: np.ndarray | None, coarser: int) -> np.ndarray:
+    def keys(self, hits: np.ndarray, view_distance: np.ndarray | None, coarser: int) -> np.ndarray:
         """(H,) uint64: size, place and facing of the cell that each of ``hits`` lies in."""
         # Columns in float32: bakes bind millions of hits, and only borders of cells move by rounding.
         position = np.ascontiguousarray(hits[:, :3].T)
@@ -171,6 +123,82 @@ class Patches:
             key = (key << np.uint64(_AXIS_BITS)) | inside.astype(np.uint64)
         return key
 
+
+class Patches:
+    """All patches of a bake.
+
+    ``points`` (N, POINTS, 4) float32: position and packed normal; the first is the leader, which every hit of the
+    patch sees. ``seen`` (N,) bool: a texel of a probe lies on it.
+    """
+
+    def __init__(self, grid: Grid):
+        self._rule = CellRule(grid)
+        self.cell = self._rule.cell
+        self._keys = [np.zeros(0, np.uint64) for _ in range(VARIANTS)]  # sorted
+        self._ids = [np.zeros(0, np.int64) for _ in range(VARIANTS)]
+        self.points = np.zeros((0, POINTS, 4), np.float32)
+        self.seen = np.zeros(0, bool)
+
+    @property
+    def count(self) -> int:
+        return len(self.points)
+
+    def bind(
+        self,
+        hits: np.ndarray,
+        view_distance: np.ndarray | None,
+        sees: Callable[[np.ndarray, np.ndarray], np.ndarray],
+        found: bool = True,
+        coarser: int = 0,
+        row_length: int = 4,
+    ) -> np.ndarray:
+        """(H,) patch of each of ``hits`` (H, 4), position and packed normal; NO_PATCH for hits with a negative one.
+        Patches that are missing are founded, or left NO_PATCH without ``found``.
+
+        ``view_distance`` (H,) metres to the probe whose texels the hits are; None for ends of rays between patches.
+        ``sees(items, patches)`` tells which hits (by number) see the leader of a patch. ``row_length``: hits in a row,
+        whose neighbours lie side by side.
+        """
+        result = np.full(len(hits), NO_PATCH, np.int64)
+        pending = np.flatnonzero(hits[:, 3] >= 0)
+        keys = self._rule.keys(hits[pending], None if view_distance is None else view_distance[pending], coarser)
+        first_new = self.count
+        leads = np.zeros(len(hits), bool)
+        for variant in range(VARIANTS):
+            if not len(pending):
+                break
+            unique, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
+            known = self._known(variant, unique)
+            if found:
+                self._found(variant, unique, known, pending[first], hits)
+            ids = known[inverse]
+            joined = (ids >= first_new) & (first[inverse] == np.arange(len(pending)))  # a leader sees itself
+            leads[pending[joined]] = True
+            ask = np.flatnonzero((ids >= 0) & ~joined)
+            if len(ask):
+                joined[ask] = sees(pending[ask], ids[ask]) if variant < VARIANTS - 1 else True
+            result[pending[joined]] = ids[joined]
+            pending, keys = pending[~joined], keys[~joined]
+        if view_distance is not None:
+            self.seen[result[result >= 0]] = True
+        if found:
+            self._choose_points(first_new, hits, np.where(leads, NO_PATCH, result), row_length)
+        return result
+
+    def bind_ends(
+        self, hits: np.ndarray, round_: int, sees: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    ) -> np.ndarray:
+        """(H,) patches on which rays of a round end, NOTHING for ``hits`` (H, 4) without surface, where no light comes
+        back. What only rays see gets the coarser patches the more rays it takes to see it, in the last round none."""
+        ends = self.bind(hits, None, sees, found=round_ == 0)
+        lost = (ends == NO_PATCH) & (hits[:, 3] >= 0)
+        ends[hits[:, 3] < 0] = NOTHING
+        if lost.any() and 0 < round_ < MOST_ROUNDS - 1:
+            alone = hits.copy()
+            alone[~lost, 3] = -1.0
+            ends[lost] = self.bind(alone, None, sees, coarser=coarser_by(round_))[lost]
+        return ends
+
     def _known(self, variant: int, unique: np.ndarray) -> np.ndarray:
         """(U,) patches with the sorted keys ``unique`` (U,), NO_PATCH where there is none."""
         keys, ids = self._keys[variant], self._ids[variant]
@@ -181,27 +209,38 @@ class Patches:
         result[same] = ids[at[same]]
         return result
 
-    def _found(self, variant: int, unique: np.ndarray, known: np.ndarray, leaders: np.ndarray) -> None:
-        """Founds patches for those of the sorted keys ``unique`` (U,) that are not in ``known`` (U,), led by
-        ``leaders`` (U, 4), and completes ``known``."""
-        fresh = known == NO_PATCH
-        count = int(fresh.sum())
-        known[fresh] = self.count + np.arange(count)
+    def _found(
+        self, variant: int, unique: np.ndarray, known: np.ndarray, leaders: np.ndarray, hits: np.ndarray
+    ) -> None:
+        """Founds patches for those of the sorted keys ``unique`` (U,) that are not in ``known`` (U,), led by the hits
+        ``leaders`` (U,), numbered in their order, and completes ``known``."""
+        fresh = np.flatnonzero(known == NO_PATCH)
+        in_order = fresh[np.argsort(leaders[fresh])]
+        known[in_order] = self.count + np.arange(len(fresh))
         at = np.searchsorted(self._keys[variant], unique[fresh])
         self._keys[variant] = np.insert(self._keys[variant], at, unique[fresh])
         self._ids[variant] = np.insert(self._ids[variant], at, known[fresh])
-        points = np.repeat(leaders[fresh, None], POINTS, axis=1).astype(np.float32)
+        points = np.repeat(hits[leaders[in_order], None], POINTS, axis=1).astype(np.float32)
         self.points = np.concatenate([self.points, points])
-        self.seen = np.concatenate([self.seen, np.zeros(count, bool)])
+        self.seen = np.concatenate([self.seen, np.zeros(len(fresh), bool)])
 
-    def _choose_points(self, first_new: int, hits: np.ndarray, patch: np.ndarray) -> None:
-        """Spreads the points of patches from ``first_new`` on over the hits that founded them."""
+    def _choose_points(self, first_new: int, hits: np.ndarray, patch: np.ndarray, row_length: int) -> None:
+        """Points of the patches from ``first_new`` on beside their leaders: a hit competes for one of POINTS places, by
+        where it lies in blocks of 4×4 neighbours, the lowest scrambled number wins, and winners share the points
+        evenly."""
         member = np.flatnonzero(patch >= first_new)
-        member = member[np.argsort(patch[member], kind="stable")]
-        count = np.bincount(patch[member] - first_new, minlength=self.count - first_new)
-        start = np.cumsum(count) - count
-        chosen = start[:, None] + np.arange(POINTS) * count[:, None] // POINTS
-        self.points[first_new:] = hits[member[chosen]]
+        place = (member % row_length & 3) + 4 * (member // row_length & 3)
+        scrambled = member.astype(np.uint32) * _SCRAMBLE
+        winner = np.full((self.count - first_new, POINTS), _NOBODY)
+        np.minimum.at(winner, (patch[member] - first_new, place), scrambled)
+        won = winner < _NOBODY
+        won[:, 0] = True  # the leader's
+        position = np.argsort(~won, axis=1, kind="stable")  # places that somebody has, in order
+        chosen = np.arange(POINTS) * won.sum(axis=1)[:, None] // POINTS
+        place = np.take_along_axis(position, chosen, axis=1)
+        rows, columns = np.nonzero(place > 0)
+        hit = winner[rows, place[rows, columns]] * _UNSCRAMBLE
+        self.points[first_new + rows, columns] = hits[hit]
 
 
 def _facing(packed: np.ndarray) -> np.ndarray:

@@ -262,9 +262,8 @@ class GpuBackend:
 
     def _bind_portion(self, surfaces: Surfaces, start: int, count: int) -> None:
         first = surfaces.first + start
-        patches = self.light.bind_texels(
-            self._texel_hits(surfaces, start, count), self._positions[first : first + count]
-        )
+        hits = self._texel_hits(surfaces, start, count)
+        patches = self.light.patches.bind_texels(hits, self.face, self.probe_slots, first, count)
         shader = program("texel_patches_comp", FACE=self.face)
         shader.uniform_sampler("patches", patches)
         shader.image("albedo", surfaces.textures["albedo"])

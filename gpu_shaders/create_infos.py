@@ -199,24 +199,6 @@ def texel_patches_comp(info, defines):
     return {"compute": ["data_lib", "texel_patches_comp"]}
 
 
-def patch_visible_comp(info, defines):
-    slot = _scene(info, defines, attributes=False)
-    _samplers(info, "hits", "pairs", "patch_points", first=slot)
-    _image(info, 0, "visible", pixel="R32F")
-    _ints(info, "pair_count")
-    info.local_group_size(64, 1, 1)
-    return {
-        "compute": [
-            "data_lib",
-            "octahedral_lib",
-            *_surface_files(defines),
-            "offset_lib",
-            "ray_lib",
-            "patch_visible_comp",
-        ]
-    }
-
-
 def patch_spread_comp(info, defines):
     slot = _scene(info, defines, attributes="HAS_EMITTERS" in defines)
     slot = _emitters(info, defines, slot)
@@ -296,6 +278,7 @@ def patch_change_comp(info, defines):
     _image(info, 0, "change")
     _ints(info, "patch_count")
     info.push_constant("FLOAT", "scale")
+    info.push_constant("FLOAT", "unseen")
     info.local_group_size(256, 1, 1)
     return {"compute": ["data_lib", "patch_change_comp"]}
 

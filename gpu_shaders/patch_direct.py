@@ -60,21 +60,19 @@ class PatchDirect:
         """Patches lit so far."""
         return self._together[-1][1] if self._together else 0
 
-    def add(self, patch_points: np.ndarray) -> None:
-        """Lights the patches of ``patch_points`` (N, POINTS, 4) that are not lit yet."""
-        points = upload(patch_points, "patches")
-        fresh = (self.count, len(patch_points))
+    def add(self, points: gpu.types.GPUTexture, count: int) -> None:
+        """Lights those of ``count`` patches with ``points`` (see PatchFinder) that are not lit yet."""
+        fresh = (self.count, count)
         self._together.append(fresh)
         for part in self._wanted_parts():
             self._parts.setdefault(part, _PartLight()).grow(*self.spread(part, points, *fresh))
         self._light_what_is_due(points)
 
-    def again(self, patch_points: np.ndarray, changed: np.ndarray, emitters: bool) -> int:
+    def again(self, points: gpu.types.GPUTexture, changed: np.ndarray, emitters: bool) -> int:
         """Direct light where lamps ``changed`` (lamp_count,) bool, or all sampled ``emitters``, or came or left.
 
         Returns the number of lamps that were lit from nothing.
         """
-        points = upload(patch_points, "patches")
         before, self._parts, lamps = self._parts, {}, 0
         for part in self._wanted_parts():
             differs = emitters if part == EMITTERS else changed[slice(*part)].any()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light between patches on the GPU: which patch every texel lies on, direct light, rays between patches, bounces.
+"""Light between patches on the GPU: direct light, rays between patches, bounces.
 
-core/patches.py decides what a patch is; here its points are lit and its rays traced. Everything that depends on
+patch_finder.py knows which patch is where; here its points are lit and its rays traced. Everything that depends on
 geometry alone (points, ends of rays, what they reflect) stays where it is when only lights change.
 """
 
@@ -15,10 +15,12 @@ import numpy as np
 
 from ..core.extrapolation import STATES, reduced_rank
 from ..core.grid import Grid
-from ..core.patches import MOST_ROUNDS, POINTS, RAYS, Patches, effort, gather_rays
+from ..core.patches import MOST_ROUNDS, POINTS, RAYS, effort, gather_rays
 from ..core.settings import BakeSettings
 from .dispatch import dispatch_linear
+from .growing_array import GrowingArray, copy_elements
 from .patch_direct import PatchDirect
+from .patch_finder import PatchFinder
 from .programs import program
 from .scene_textures import SceneTextures
 from .textures import allocate, read, upload
@@ -29,12 +31,10 @@ _UNSEEN = 1e-6  # weight of patches that no probe sees where iterations are comp
 
 @dataclass
 class _Rays:
-    """What ``count`` rays found, see patch_rays_comp.glsl, and the irradiance they brought along, by patch."""
+    """Where ``count`` rays end, see patch_rays_comp.glsl."""
 
     count: int
     hits: gpu.types.GPUTexture
-    brought: gpu.types.GPUTexture
-    reflected: gpu.types.GPUTexture
 
 
 class PatchLight:
@@ -42,7 +42,7 @@ class PatchLight:
 
     def __init__(self, scene: SceneTextures, grid: Grid, settings: BakeSettings, world_texels):
         """``world_texels``: the world's radiance as a linear texture, faces of ``settings.face``²; may be replaced."""
-        self.patches = Patches(grid)
+        self.patches = PatchFinder(scene, grid)
         self._scene, self._settings = scene, settings
         self.world_texels = world_texels
         self._direct = PatchDirect(scene, settings)
@@ -51,35 +51,6 @@ class PatchLight:
     @property
     def count(self) -> int:
         return self.patches.count
-
-    # Which patch
-    # ------------------------------------------------------------------------------------------------------------------
-
-    def bind_texels(self, hits: gpu.types.GPUTexture, view: np.ndarray) -> gpu.types.GPUTexture:
-        """Patches of texels, four an element: ``hits`` as texel_hits_comp writes them, ``view`` (probes, 3) positions
-        relative to the grid's centre."""
-        texels = 6 * self._settings.face**2
-        values = read(hits, len(view) * texels)
-        distance = np.linalg.norm(values[:, :3].reshape(len(view), texels, 3) - view[:, None], axis=2).reshape(-1)
-        return upload(_fours(self.patches.bind(values, distance, self._sees(hits))), "texels")
-
-    def _sees(self, hits: gpu.types.GPUTexture):
-        def sees(items: np.ndarray, patches: np.ndarray) -> np.ndarray:
-            shader = program("patch_visible_comp", POINTS=1, **self._scene.ray_defines)
-            pairs = np.zeros((len(items), 4), np.float32)
-            pairs[:, 0], pairs[:, 1] = items, patches
-            visible = allocate(len(items), "hits", "R32F")
-            pair_texture, points = upload(pairs, "hits"), upload(self.patches.points[:, 0], "patches")
-            self._scene.bind_rays(shader)
-            shader.uniform_sampler("hits", hits)
-            shader.uniform_sampler("pairs", pair_texture)
-            shader.uniform_sampler("patch_points", points)
-            shader.image("visible", visible)
-            shader.uniform_int("pair_count", (len(items),))
-            dispatch_linear(shader, len(items))
-            return read(visible, len(items), channels=1)[:, 0] > 0
-
-        return sees
 
     # Light
     # ------------------------------------------------------------------------------------------------------------------
@@ -90,7 +61,7 @@ class PatchLight:
             return
         if self._direct.count == 0:
             self._direct.effort = effort(self.count, self._settings.samples)
-        self._direct.add(self.patches.points)
+        self._direct.add(self.patches.points, self.count)
 
     def light_again(self, changed: np.ndarray, emitters: bool) -> int:
         """Direct light of all patches where lamps ``changed`` (lamp_count,) bool, or sampled ``emitters`` did. Returns
@@ -113,58 +84,65 @@ class PatchLight:
     def connect(self) -> None:
         """Traces the rays between patches, round by round until they find no surface that is no patch yet, and makes
         room for the bounces."""
-        ends, brought, reflected = [np.zeros(0)], [np.zeros((0, 4))], [np.zeros((0, 4))]
+        for _ in self.connect_in_steps():
+            pass
+
+    def connect_in_steps(self) -> Iterator[None]:
+        """The same, yielding between pieces of work."""
         self._rays_each = RAYS * self._direct.effort
+        self._ends, self._reflected = GrowingArray("rays", "R32F"), GrowingArray("rays")
+        self._brought = GrowingArray("patches")
+        self._ends.reserve(0)
         stop = 0
         for round_ in range(MOST_ROUNDS):
             start, stop = stop, self.count
-            for rays in self._trace_patches(start, stop):
-                ends.append(self._bind_ends(rays.hits, rays.count, round_))
-                brought.append(read(rays.brought, rays.count // self._rays_each))
-                reflected.append(read(rays.reflected, rays.count))
+            for first, rays in self._trace_patches(start, stop):
+                ends = self.patches.bind_ends(rays.hits, rays.count, round_)
+                copy_elements(ends, self._ends.reserve(stop * self._rays_each), "R32F", rays.count, first)
+                yield
             if stop == self.count:
                 break
         self.light_new_patches()
-        self._ends = upload(_fours(np.concatenate(ends)), "rays")
-        self._carry(brought, reflected)
-        self._seen = upload(_fours(np.where(self.patches.seen, 1.0, _UNSEEN)), "patches")
+        self._carry()
         self._irradiance = [allocate(self.count, "patches") for _ in range(STATES)]
+        yield
 
     def carry_again(self) -> bool:
         """What rays bring along and reflect, for another world or other materials; where they end stays.
 
         False if a ray that reflected nothing now does, or the other way round: then patches must be found anew.
         """
-        brought, reflected = [np.zeros((0, 4))], [np.zeros((0, 4))]
-        for rays in self._trace_patches(0, self.count):
-            brought.append(read(rays.brought, rays.count // self._rays_each))
-            reflected.append(read(rays.reflected, rays.count))
-        before, after = (np.concatenate(parts)[:, :3].any(axis=1) for parts in (self._reflecting, reflected))
-        if (before != after).any():
+        before = self._reflecting()
+        for _ in self._trace_patches(0, self.count):
+            pass
+        if (self._reflecting() != before).any():
             return False
-        self._carry(brought, reflected)
+        self._carry()
         return True
 
-    def _carry(self, brought: list[np.ndarray], reflected: list[np.ndarray]) -> None:
-        self._reflecting = reflected
-        self._brought_values = np.concatenate(brought)
-        self._brought = upload(self._brought_values, "patches")
-        self._reflected = upload(np.concatenate(reflected), "rays")
+    def _reflecting(self) -> np.ndarray:
+        """(rays,) bool: does light come back?"""
+        return read(self._reflected.texture, self.count * self._rays_each)[:, :3].any(axis=1)
 
-    def _trace_patches(self, start: int, stop: int) -> Iterator[_Rays]:
-        """The rays of patches ``start`` .. ``stop``, part by part."""
+    def _carry(self) -> None:
+        self._brought_values = read(self._brought.texture, self.count)
+
+    def _trace_patches(self, start: int, stop: int) -> Iterator[tuple[int, _Rays]]:
+        """The rays of patches ``start`` .. ``stop``, part by part: number of the first ray, what the part found."""
         at_once = max(1, _RAYS_AT_ONCE // self._rays_each)
-        points = upload(self.patches.points, "patches")
+        reflected, brought = self._reflected.reserve(stop * self._rays_each), self._brought.reserve(stop)
         for first in range(start, stop, at_once):
-            yield self._trace(points, POINTS, first, min(stop - first, at_once), self._rays_each)
+            count = min(stop - first, at_once)
+            rays = self._trace(self.patches.points, POINTS, first, count, self._rays_each, reflected, brought)
+            yield first * self._rays_each, rays
 
-    def _bind_ends(self, hits: gpu.types.GPUTexture, count: int, round_: int) -> np.ndarray:
-        return self.patches.bind_ends(read(hits, count), round_, self._sees(hits))
-
-    def _trace(self, points, points_each: int, first: int, count: int, rays_each: int, segments: int = 1, first_key=0):
-        """``rays_each`` rays of each of ``count`` patches from ``first``, with ``points_each`` places in ``points``."""
+    def _trace(
+        self, points, points_each: int, first: int, count: int, rays_each: int, reflected, brought, segments=1, first_key=0
+    ) -> _Rays:
+        """``rays_each`` rays of each of ``count`` patches from ``first``, with ``points_each`` places in ``points``.
+        What they reflect and bring along goes into arrays of all rays and of all patches."""
         rays = count * rays_each
-        hits, carried, reflected = (allocate(rays, "rays") for _ in range(3))
+        hits, carried = (allocate(rays, "rays") for _ in range(2))
         is_path = segments > 1
         defines = self._scene.surface_defines | (self._scene.light_defines if is_path else {})
         shader = program(
@@ -190,13 +168,13 @@ class PatchLight:
         ):
             shader.uniform_int(name, (value,))
         dispatch_linear(shader, rays)
-        brought = allocate(count, "patches")
         shader = program("patch_carried_comp", RAYS=rays_each)
         shader.uniform_sampler("carried", carried)
         shader.image("brought", brought)
+        shader.uniform_int("first_patch", (first,))
         shader.uniform_int("patch_count", (count,))
         dispatch_linear(shader, count)
-        return _Rays(rays, hits, brought, reflected)
+        return _Rays(rays, hits)
 
     # Bounces
     # ------------------------------------------------------------------------------------------------------------------
@@ -215,9 +193,9 @@ class PatchLight:
         self._irradiance.insert(0, self._irradiance.pop())
         self._bounce(
             self.direct,
-            self._brought,
-            self._reflected,
-            self._ends,
+            self._brought.texture,
+            self._reflected.texture,
+            self._ends.texture,
             self._rays_each,
             self.count,
             self._irradiance[0],
@@ -228,7 +206,8 @@ class PatchLight:
         shader = program("patch_change_comp")
         for name, texture in zip(("irradiance_new", "irradiance_old", "irradiance_older"), self._irradiance):
             shader.uniform_sampler(name, texture)
-        shader.uniform_sampler("patch_seen", self._seen)
+        shader.uniform_sampler("patch_seen", self.patches.seen)
+        shader.uniform_float("unseen", _UNSEEN)
         shader.image("change", self._change)
         shader.uniform_int("patch_count", (self.count,))
         shader.uniform_float("scale", scale)
@@ -283,14 +262,8 @@ class PatchLight:
         direct, result = allocate(count, "texels"), allocate(count, "texels")
         reflects = np.flatnonzero(read(hits, count)[:, 3] >= 0)
         self._direct.light(hits, 1, reflects, settings.samples, direct, first_key)
-        rays = self._trace(hits, 1, 0, count, rays_each, settings.gather, first_key)
-        ends = upload(_fours(self._bind_ends(rays.hits, rays.count, MOST_ROUNDS - 1)), "rays")
-        self._bounce(direct, rays.brought, rays.reflected, ends, rays_each, count, result)
+        reflected, brought = allocate(count * rays_each, "rays"), allocate(count, "texels")
+        rays = self._trace(hits, 1, 0, count, rays_each, reflected, brought, settings.gather, first_key)
+        ends = self.patches.bind_ends(rays.hits, rays.count, MOST_ROUNDS - 1)
+        self._bounce(direct, brought, reflected, ends, rays_each, count, result)
         return result
-
-
-def _fours(values: np.ndarray) -> np.ndarray:
-    """``values`` (N,) as rows of four, padded with zeros."""
-    rows = np.zeros(-(-len(values) // 4) * 4, np.float32)
-    rows[: len(values)] = values
-    return rows.reshape(-1, 4)

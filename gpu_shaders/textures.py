@@ -32,6 +32,13 @@ def allocate(elements: int, what: str, pixel: str = "RGBA32F") -> gpu.types.GPUT
     return texture
 
 
+def allocate_integers(elements: int, what: str, value: int) -> gpu.types.GPUTexture:
+    """Linear array of ``elements`` unsigned 32-bit integers, all of ``value``."""
+    texture = gpu.types.GPUTexture((ROW, _rows(elements, what)), format="R32UI")
+    texture.clear(format="UINT", value=(value - (value >> 31 << 32),))  # Python's binding takes signed ones
+    return texture
+
+
 def layers(width: int, height: int, count: int, pixel: str) -> gpu.types.GPUTexture:
     """Layered image without defined content."""
     return gpu.types.GPUTexture((width, height), layers=count, format=pixel)

@@ -15,7 +15,7 @@ void main()
     vec3 old = element(irradiance_old, i).rgb * scale;
     vec3 change = fresh - old;
     vec3 last_change = old - element(irradiance_older, i).rgb * scale;
-    float weight = element(patch_seen, i >> 2)[i & 3];
+    float weight = max(element(patch_seen, i).x, unseen);
     sum += weight * vec4(dot(fresh, fresh), dot(change, change), dot(change, last_change), dot(fresh, vec3(0.2126, 0.7152, 0.0722)));
   }
   partial_sums[lane] = sum;

@@ -2,7 +2,7 @@
  *
  * Rays are cosine-weighted, so π·mean(radiance) is the irradiance and π cancels against albedo/π. Ends that lie on no patch are left
  * out of the mean: the row sums of the transport stay right, a furnace stays a furnace.
- * Dispatch: one thread a patch; groups of 64. ray_ends: four rays an element; −1 no patch, −2 nothing comes back.
+ * Dispatch: one thread a patch; groups of 64. ray_ends: −1 no patch, −2 nothing comes back.
  * Reference: core/reference_bake.py.
  */
 
@@ -16,13 +16,11 @@ void main()
   if (bounce != 0) {
     vec3 sum = vec3(0.0);
     int counted = 0;
-    for (int i = 0; i < RAYS / 4; i++) {
-      ivec4 ends = ivec4(element(ray_ends, patch_index * (RAYS / 4) + i));
-      for (int j = 0; j < 4; j++) {
-        counted += ends[j] != -1 ? 1 : 0;
-        if (ends[j] >= 0) {
-          sum += element(reflected, patch_index * RAYS + 4 * i + j).rgb * element(irradiance_in, ends[j]).rgb;
-        }
+    for (int i = patch_index * RAYS; i < (patch_index + 1) * RAYS; i++) {
+      int end = int(element(ray_ends, i).x);
+      counted += end != -1 ? 1 : 0;
+      if (end >= 0) {
+        sum += element(reflected, i).rgb * element(irradiance_in, end).rgb;
       }
     }
     irradiance += element(brought, patch_index).rgb + sum / float(max(counted, 1));

@@ -2,7 +2,7 @@
  *
  * Dispatch: one thread a ray from first_ray on, RAYS a patch; groups of 64. Directions are cosine-weighted (Malley), stratified over the
  * patch; with SEGMENTS above 1 a ray goes on as a path, and direct light is sampled where it bounces.
- * Writes for each ray, counted from first_ray: hits (position, packed normal; −1 where nothing more can come), `carried` (emission that points
+ * Writes for each ray, counted from first_ray but for `reflected`: hits (position, packed normal; −1 where nothing more can come), `carried` (emission that points
  * on emitters do not answer for, or the world, and direct light at the bounces) and `reflected` (product of the albedos on the way).
  */
 
@@ -52,5 +52,5 @@ void main()
   }
   imageStore(hits, element_position(entry), throughput == vec3(0.0) ? vec4(0.0, 0.0, 0.0, -1.0) : end);
   imageStore(carried, element_position(entry), vec4(brought, 0.0));
-  imageStore(reflected, element_position(entry), vec4(throughput, 0.0));
+  imageStore(reflected, element_position(first_ray + entry), vec4(throughput, 0.0));
 }

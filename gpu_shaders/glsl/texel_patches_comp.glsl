@@ -1,6 +1,6 @@
 /* Notes in albedo.w on which patch each texel lies, −1 for none.
  *
- * Dispatch: x = columns, y = 6·FACE rows, z = probes; groups of 8×8×1. `patches` holds four texels an element, counted as in texel_hits.
+ * Dispatch: x = columns, y = 6·FACE rows, z = probes; groups of 8×8×1. `patches` counts texels as texel_hits_comp does.
  */
 
 void main()
@@ -11,5 +11,5 @@ void main()
   }
   ivec3 at = ivec3(id.xy, first_layer + id.z);
   int texel = (id.z * 6 * FACE + id.y) * FACE + id.x;
-  imageStore(albedo, at, vec4(imageLoad(albedo, at).rgb, element(patches, texel >> 2)[texel & 3]));
+  imageStore(albedo, at, vec4(imageLoad(albedo, at).rgb, element(patches, texel).x));
 }

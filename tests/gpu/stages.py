@@ -14,7 +14,7 @@ from gridlight.core.reference_bake import ReferenceBake
 from gridlight.core.reference_scene import Surfaces
 from gridlight.gpu_shaders.backend import GpuBackend
 from gridlight.gpu_shaders.textures import allocate, read, upload
-from shader_runner import read_layers
+from shader_runner import read_layers, run
 
 BACKGROUND = 1e29  # distances from here on
 
@@ -26,6 +26,17 @@ class Connections:
     brought: np.ndarray  # (N, 3)
     reflected: np.ndarray  # (N, R, 3)
     ends: np.ndarray  # (N, R)
+
+
+class PatchesOfGpu:
+    """Stands in for the reference's patches where it reads light at those of the GPU."""
+
+    def __init__(self, finder):
+        self._finder = finder
+
+    def bind_ends(self, hits, round_, sees):
+        bound = self._finder.bind_ends(upload(hits, "test"), len(hits), round_)
+        return read(bound, len(hits), channels=1)[:, 0].astype(int)
 
 
 class Stages:
@@ -104,11 +115,25 @@ class Stages:
     @property
     def points(self):
         """(N, POINTS, 4)"""
-        return self.light.patches.points
+        return self.light.patches.read_points()
 
     def sees_leader(self, hits, patches):
         """(H,) the GPU's word on which ``hits`` (H, 4) see the leader of their patch (H,)."""
-        return self.light._sees(upload(hits, "test"))(np.arange(len(hits)), patches)
+        scene = self.backend.scene
+        defines = {name: "" if value is True else value for name, value in scene.ray_defines.items() if value}
+        surfaces = ["surface_lib"] if scene.has_alpha else []
+        names = ["bvh_nodes", "triangle_corners"]
+        if scene.has_alpha:
+            names += ["triangle_attributes", "materials"] + ["image_table", "image_texels"] * scene.has_images
+        found = run(
+            "sight",
+            len(hits),
+            libraries=["data_lib", "octahedral_lib", *surfaces, "offset_lib", "ray_lib", "patch_sight_lib"],
+            inputs={"hits": hits, "leaders": self.points[patches, 0]},
+            textures_2d={name: scene._textures[name] for name in names},
+            defines=defines,
+        )
+        return found[:, 0] > 0
 
     def direct_of(self, patches, samples):
         """(C, 3) direct light of ``patches`` (C,) by so many samples."""
@@ -123,12 +148,14 @@ class Stages:
 
     def rays(self, first, count, rays_each, segments=1):
         """hits (C, R, 4), brought (C, 3), reflected (C, R, 3) of ``count`` patches from ``first``."""
-        found = self.light._trace(upload(self.points, "test"), POINTS, first, count, rays_each, segments)
-        hits, reflected = (read(texture, count * rays_each) for texture in (found.hits, found.reflected))
+        stop = first + count
+        reflected, brought = allocate(stop * rays_each, "test"), allocate(stop, "test")
+        points = self.light.patches.points
+        found = self.light._trace(points, POINTS, first, count, rays_each, reflected, brought, segments)
         return (
-            hits.reshape(count, rays_each, 4),
-            read(found.brought, count)[:, :3],
-            reflected[:, :3].reshape(count, rays_each, 3),
+            read(found.hits, count * rays_each).reshape(count, rays_each, 4),
+            read(brought, stop)[first:, :3],
+            read(reflected, stop * rays_each)[first * rays_each :, :3].reshape(count, rays_each, 3),
         )
 
     def connect(self):
@@ -137,9 +164,9 @@ class Stages:
         self.light.connect()
         count, each = self.light.count, self.light._rays_each
         return Connections(
-            read(self.light._brought, count)[:, :3].astype(float),
-            read(self.light._reflected, count * each)[:, :3].reshape(count, each, 3).astype(float),
-            read(self.light._ends, count * each // 4).reshape(count, each).astype(int),
+            read(self.light._brought.texture, count)[:, :3].astype(float),
+            read(self.light._reflected.texture, count * each)[:, :3].reshape(count, each, 3).astype(float),
+            read(self.light._ends.texture, count * each, channels=1).reshape(count, each).astype(int),
         )
 
     def iterate(self, bounce):

@@ -21,7 +21,7 @@ from gridlight.core.settings import BakeSettings
 from gridlight.core.snapshot import Light
 from gridlight.gpu_shaders.textures import read, upload
 from small_scenes import all_lights, bake, cluttered_room, frame, irradiance_at_nodes
-from stages import Stages
+from stages import PatchesOfGpu, Stages
 
 GRID = Grid.from_bounds([-0.6, -0.5, -0.5], [0.7, 0.5, 0.4], (3, 2, 2))
 
@@ -97,12 +97,12 @@ def test_patches_of_texels(stages):
     again, agree, hidden = Patches(GRID), [], []
 
     def sees(items, patches):
-        found = stages.sees_leader(hits[items], patches)
+        found = stages.sees_leader(hits[items], patches)  # numbered alike
         agree.append(found == reference.light.sees_leader(hits[items], again.points[patches, 0]))
         hidden.append(~found)
         return found
 
-    patch = again.bind(hits, distance.astype(np.float32), sees)
+    patch = again.bind(hits, distance.astype(np.float32), sees, row_length=8)
     np.testing.assert_array_equal(stages.patch().ravel(), patch)
     np.testing.assert_array_equal(stages.points[: again.count], again.points)
     np.testing.assert_array_equal(patch >= 0, hits[:, 3] >= 0)
@@ -201,7 +201,7 @@ def test_bounces(lit):
     """From the GPU's direct light and rays: the first four irradiances, the sums that judge them, an extrapolation."""
     made = lit.connections
     direct = lit.direct()
-    seen = np.where(lit.light.patches.seen, 1.0, 1e-6)
+    seen = np.where(lit.light.patches.read_seen(), 1.0, 1e-6)
     last, before = np.zeros_like(direct), np.zeros_like(direct)
     scale = 1.0 / (direct + made.brought).max()  # of the sums of squares
     for index in range(4):
@@ -262,7 +262,7 @@ def test_final_gather(lit, segments):
     count, rays_each = GRID.count * 6 * 8**2, 4
     settings = replace(lit.settings, gather=segments, samples=rays_each)
     lit.light._settings, lit.reference.light.settings = settings, settings
-    lit.reference.light.patches = lit.light.patches
+    lit.reference.light.patches = PatchesOfGpu(lit.light.patches)
     irradiance = lit.iterate(True)[0]
     found = read(lit.light.gather(lit.hits_texture(), count, 7), count)[:, :3]
     expected = lit.reference.light.gather(lit.hits(), rays_each, irradiance, 7)

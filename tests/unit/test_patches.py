@@ -166,17 +166,25 @@ def test_ends_of_rays():
 
 
 def test_points_are_spread_over_the_hits():
-    hits, found = floor(3000), Patches(GRID)
-    patch = found.bind(hits, far(hits), everything)
+    """Neighbours in a 4×4 block never compete; who wins shares the points evenly, the leader among them."""
+    side = np.arange(-3.5, 3.5, 0.11)
+    places = np.stack([*np.meshgrid(side, side, indexing="xy"), np.full((len(side),) * 2, -1.0)], axis=-1)
+    hits, found = hits_at(places.reshape(-1, 3)), Patches(GRID)  # 64 in a row, four of them across a cell
+    patch = found.bind(hits, far(hits), everything, row_length=len(side))
     assert found.points.shape == (found.count, POINTS, 4)
-    for number in range(0, found.count, 17):
+    sizes = []
+    for number in range(found.count):
         mine = hits[patch == number]
-        chosen = found.points[number]
+        chosen, times = np.unique(found.points[number], axis=0, return_counts=True)
         assert (chosen[:, None] == mine).all(axis=2).any(axis=1).all(), "points are hits of the patch"
-        assert len(np.unique(chosen, axis=0)) == min(POINTS, len(mine))
-    few = found.points.copy()
+        assert (found.points[number, 0] == mine[0]).all(), "the leader comes first"
+        assert times.max() - times.min() <= 1
+        assert len(chosen) >= min(len(mine), POINTS) - 1, "the leader leaves its own place empty"
+        sizes.append(len(mine))
+    assert min(sizes) < POINTS <= max(sizes)
+    before = found.points.copy()
     found.bind(floor(500, seed=9), far(floor(500)), everything)
-    np.testing.assert_array_equal(found.points[: len(few)], few)
+    np.testing.assert_array_equal(found.points[: len(before)], before)
 
 
 def test_two_runs_number_alike():

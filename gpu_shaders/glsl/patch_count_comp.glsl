@@ -1,0 +1,13 @@
+/* First step of a compaction, see patch_select_lib: the number of selected entries of each block.
+ *
+ * Dispatch: one group of 256 threads a block.
+ */
+
+void main()
+{
+  int block = int(gl_WorkGroupID.x);
+  count_selected(block * BLOCK + int(gl_LocalInvocationID.x) * RUN);
+  if (gl_LocalInvocationID.x == 255u) {
+    imageStore(block_counts, element_position(block), vec4(float(counts[255])));
+  }
+}

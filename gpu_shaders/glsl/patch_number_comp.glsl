@@ -1,0 +1,27 @@
+/* Numbers new patches in the order of their leaders and enters them in the table; second step of a compaction, see patch_select_lib.
+ *
+ * Dispatch: one group of 256 threads a block. total_in, total_out: number of patches before and after.
+ */
+
+void main()
+{
+  int block = int(gl_WorkGroupID.x);
+  int lane = int(gl_LocalInvocationID.x);
+  int first = block * BLOCK + lane * RUN;
+  int number = int(texelFetch(total_in, ivec2(0), 0).x) + count_before(block);
+  if (lane == 0 && block == int(gl_NumWorkGroups.x) - 1) {
+    imageStore(total_out, ivec2(0), vec4(float(number + int(element(block_counts, block).x))));
+  }
+  number += count_selected(first).y;
+  for (int i = 0; i < RUN; i++) {
+    int hit = item_hit(first + i);
+    if (is_selected(hit)) {
+      int slot = int(element(slots, hit).x);
+      vec4 key = element(hit_keys, hit);
+      imageStore(table, element_position(slot), uvec4(uint(number + 1)));
+      imageStore(patch_keys, element_position(number), vec4(key.xyz, key.w * float(VARIANT_COUNT) + float(variant)));
+      imageStore(patch_points, element_position(number * POINTS), element(hits, hit));
+      number++;
+    }
+  }
+}

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Linear arrays on the GPU that grow and keep what they hold."""
+
+from __future__ import annotations
+
+import gpu
+
+from .dispatch import dispatch_linear
+from .programs import program
+from .textures import allocate, allocate_integers
+
+
+def copy_elements(source: gpu.types.GPUTexture, target: gpu.types.GPUTexture, pixel: str, count: int, first: int = 0):
+    """Copies the first ``count`` elements of ``source`` to ``target`` from element ``first`` on. ``pixel``: of both."""
+    shader = program("copy_elements_comp", PIXEL=pixel, KIND="UINT_2D" if pixel == "R32UI" else "FLOAT_2D")
+    shader.uniform_sampler("source", source)
+    shader.image("target", target)
+    shader.uniform_int("first", (first,))
+    shader.uniform_int("count", (count,))
+    dispatch_linear(shader, count)
+
+
+class GrowingArray:
+    """``texture`` holds at least as many elements as were reserved; the new ones are zero, or ``fill`` where they are
+    integers."""
+
+    def __init__(self, what: str, pixel: str = "RGBA32F", fill: int = 0):
+        self._what, self._pixel, self._fill = what, pixel, fill
+        self.capacity = 0  # elements
+        self.texture: gpu.types.GPUTexture | None = None
+
+    def reserve(self, elements: int) -> gpu.types.GPUTexture:
+        """Makes room for ``elements`` and returns the texture, which is another one where it had to grow.
+
+        Raises:
+            InputError: more elements than one texture holds.
+        """
+        if self.texture is None or elements > self.capacity:
+            before, held = self.texture, self.capacity
+            self.capacity = max(elements, held + held // 2, 1)
+            self.texture = self._allocate()
+            if before is not None:
+                copy_elements(before, self.texture, self._pixel, held)
+        return self.texture
+
+    def _allocate(self) -> gpu.types.GPUTexture:
+        if self._pixel == "R32UI":
+            return allocate_integers(self.capacity, self._what, self._fill)
+        return allocate(self.capacity, self._what, self._pixel)

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bindings of the shaders that find patches, see patch_finder.py. Same form as create_infos.py."""
+
+from __future__ import annotations
+
+from ..core.patches import POINTS
+from .create_infos import _image, _ints, _samplers, _scene, _surface_files
+
+
+def _atomic(info, slot: int, name: str) -> None:
+    info.image(slot, "R32UI", "UINT_2D_ATOMIC", name, qualifiers={"READ", "WRITE"})
+
+
+def _linear(info, *files: str) -> dict:
+    info.define("POINTS", str(POINTS))
+    info.local_group_size(64, 1, 1)
+    return {"compute": ["data_lib", *files]}
+
+
+def patch_keys_comp(info, defines):
+    slot = _samplers(info, "hits", "cell_rule")
+    if "HAS_VIEW" in defines:
+        _samplers(info, "probe_slots", first=slot)
+        _ints(info, "first_slot")
+    _image(info, 0, "hit_keys")
+    _image(info, 1, "bound", pixel="R32F", access="READ+WRITE")
+    _ints(info, "hit_count", "coarser", "only_lost")
+    info.push_constant("FLOAT", "without_surface")
+    return _linear(info, "octahedral_lib", "random_lib", "patch_cell_lib", "patch_keys_comp")
+
+
+def patch_claim_comp(info, defines):
+    info.define("CELL_TABLE", "")
+    _samplers(info, "items", "bound", "hit_keys", "patch_keys")
+    _atomic(info, 0, "table")
+    _atomic(info, 1, "leaders")
+    _image(info, 2, "slots", pixel="R32F")
+    _ints(info, "item_count", "hit_count", "variant", "table_mask", "found")
+    return _linear(info, "random_lib", "patch_cell_lib", "patch_claim_comp")
+
+
+def _compaction(info, defines: dict, *names: str) -> int:
+    """What patch_select_lib reads, and samplers ``names``; returns the first free image."""
+    leads = "LEADERS" in defines
+    _samplers(info, "items", "bound", *(["slots"] if leads else []), *names)
+    _ints(info, "item_count", "hit_count")
+    info.define("POINTS", str(POINTS))
+    info.local_group_size(256, 1, 1)
+    if leads:
+        _atomic(info, 0, "table")
+        _atomic(info, 1, "leaders")
+    return 2 if leads else 0
+
+
+_COMPACTION_FILES = ("data_lib", "random_lib", "patch_cell_lib", "patch_select_lib")
+
+
+def patch_count_comp(info, defines):
+    _image(info, _compaction(info, defines), "block_counts", pixel="R32F")
+    return {"compute": [*_COMPACTION_FILES, "patch_count_comp"]}
+
+
+def patch_number_comp(info, defines):
+    image = _compaction(info, defines, "block_counts", "total_in", "hit_keys", "hits")
+    _image(info, image, "total_out", pixel="R32F")
+    _image(info, image + 1, "patch_keys")
+    _image(info, image + 2, "patch_points")
+    _ints(info, "variant")
+    return {"compute": [*_COMPACTION_FILES, "patch_place_lib", "patch_number_comp"]}
+
+
+def patch_pending_comp(info, defines):
+    image = _compaction(info, defines, "block_counts")
+    _image(info, image, "total_out", pixel="R32F")
+    _image(info, image + 1, "pending", pixel="R32F")
+    return {"compute": [*_COMPACTION_FILES, "patch_place_lib", "patch_pending_comp"]}
+
+
+def patch_join_comp(info, defines):
+    slot = _scene(info, defines, attributes=False)
+    slot = _samplers(info, "items", "slots", "hits", "patch_points", "total_before", first=slot)
+    _samplers(info, "table", "leaders", kind="UINT_2D", first=slot)
+    _image(info, 0, "bound", pixel="R32F", access="READ+WRITE")
+    _atomic(info, 1, "candidates")
+    if "HAS_VIEW" in defines:
+        _image(info, 2, "seen", pixel="R32F")
+    _ints(info, "item_count", "hit_count", "first_new", "row_length", "is_last")
+    return _linear(
+        info,
+        "octahedral_lib",
+        "random_lib",
+        "patch_cell_lib",
+        *_surface_files(defines),
+        "offset_lib",
+        "ray_lib",
+        "patch_sight_lib",
+        "patch_join_comp",
+    )
+
+
+def patch_points_comp(info, defines):
+    slot = _samplers(info, "hits")
+    _samplers(info, "candidates", kind="UINT_2D", first=slot)
+    _image(info, 0, "patch_points", access="READ+WRITE")
+    _ints(info, "first_new", "patch_count")
+    return _linear(info, "patch_points_comp")
+
+
+def patch_table_comp(info, defines):
+    _samplers(info, "patch_keys")
+    _atomic(info, 0, "table")
+    _ints(info, "patch_count", "table_mask")
+    return _linear(info, "random_lib", "patch_cell_lib", "patch_table_comp")
+
+
+def copy_elements_comp(info, defines):
+    _samplers(info, "source", kind=defines["KIND"])
+    info.image(0, defines["PIXEL"], defines["KIND"], "target", qualifiers={"WRITE"})
+    _ints(info, "first", "count")
+    info.local_group_size(64, 1, 1)
+    return {"compute": ["data_lib", "copy_elements_comp"]}

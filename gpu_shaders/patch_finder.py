@@ -1,0 +1,290 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Finds patches on the GPU; what a patch is: core/patches.py, whose class Patches is the readable twin.
+
+A bind gives each of its hits a patch, variant by variant of their cells:
+
+    keys ──► claim ──► count, number ──► join ──► (those that do not see their leader) ──► claim …
+             cells      new patches       hits that see
+             in a       in order of       the leader
+             table      their leaders
+
+Nothing leaves the GPU but how many patches and hits there are.
+"""
+
+from __future__ import annotations
+
+import gpu
+import numpy as np
+
+from ..core.errors import InputError
+from ..core.grid import Grid
+from ..core.patches import MOST_ROUNDS, NO_PATCH, NOTHING, POINTS, VARIANTS, CellRule, coarser_by
+from .dispatch import dispatch_linear
+from .growing_array import GrowingArray
+from .programs import program
+from .scene_textures import SceneTextures
+from .textures import allocate, allocate_integers, read, upload
+
+_FREE, _NOBODY = 0, 0xFFFFFFFF
+_BLOCK = 4096  # entries of a compaction that a group takes, see patch_select_lib.glsl
+_FEW = 1 << 16  # hits: below, room for as many patches is made unasked, and hits are not listed
+_MOST_PLACES = 1 << 24  # of the table: their numbers are kept as float32
+
+
+class PatchFinder:
+    """All patches of a bake: ``points`` (N·POINTS elements: position relative to the grid's centre and packed normal,
+    the leader first) and ``seen`` (1 where a texel of a probe lies on a patch) as linear textures."""
+
+    def __init__(self, scene: SceneTextures, grid: Grid):
+        rule = CellRule(grid)
+        self._scene = scene
+        self._rule = upload(rule.rows(), "cells")
+        self.cell = rule.cell
+        self.count = 0
+        self._keys = GrowingArray("patches")
+        self._points = GrowingArray("patches")
+        self._seen = GrowingArray("patches", "R32F")
+        self._candidates = GrowingArray("patches", "R32UI", _NOBODY)
+        self._places = 0
+        self._totals = [gpu.types.GPUTexture((1, 1), format="R32F") for _ in range(2)]
+        self._totals[0].clear(format="FLOAT", value=(0.0,))
+        self._reserve(0)
+        self._reserve_table(0)
+
+    @property
+    def points(self) -> gpu.types.GPUTexture:
+        return self._points.texture
+
+    @property
+    def seen(self) -> gpu.types.GPUTexture:
+        return self._seen.texture
+
+    def read_points(self) -> np.ndarray:
+        """(N, POINTS, 4) float32."""
+        return read(self.points, self.count * POINTS).reshape(-1, POINTS, 4)
+
+    def read_seen(self) -> np.ndarray:
+        """(N,) bool"""
+        return read(self.seen, self.count, channels=1)[:, 0] > 0
+
+    # Binding
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def bind_texels(self, hits, face: int, probe_slots, first_slot: int, probes: int) -> gpu.types.GPUTexture:
+        """Patches of the texels of ``probes`` probes, which stand in slots from ``first_slot`` on: one number an
+        element, NO_PATCH where a texel sees nothing to light. ``hits`` as texel_hits_comp writes them."""
+        texels = 6 * face**2
+        bind = _Bind(hits, probes * texels, face, {"HAS_VIEW": True, "TEXELS": texels})
+        shader = self._keys_shader(bind, NO_PATCH)
+        shader.uniform_sampler("probe_slots", probe_slots)
+        shader.uniform_int("first_slot", (first_slot,))
+        dispatch_linear(shader, bind.count)
+        self._join_all(bind, found=True)
+        return bind.bound
+
+    def bind_ends(self, hits: gpu.types.GPUTexture, count: int, round_: int) -> gpu.types.GPUTexture:
+        """Patches on which ``count`` rays of a round end, NOTHING where no light comes back. What only rays see gets
+        the coarser patches the more rays it takes to see it, in the last round none."""
+        bind = _Bind(hits, count, 4, {})
+        dispatch_linear(self._keys_shader(bind, NOTHING), count)
+        self._join_all(bind, found=round_ == 0)
+        if 0 < round_ < MOST_ROUNDS - 1:
+            dispatch_linear(self._keys_shader(bind, NOTHING, coarser_by(round_), only_lost=True), count)
+            self._join_all(bind, found=True)
+        return bind.bound
+
+    def _keys_shader(self, bind: _Bind, without_surface: int, coarser: int = 0, only_lost: bool = False):
+        shader = program("patch_keys_comp", **bind.view)
+        shader.uniform_sampler("hits", bind.hits)
+        shader.uniform_sampler("cell_rule", self._rule)
+        shader.image("hit_keys", bind.keys)
+        shader.image("bound", bind.bound)
+        shader.uniform_float("without_surface", without_surface)
+        for name, value in (("hit_count", bind.count), ("coarser", coarser), ("only_lost", int(only_lost))):
+            shader.uniform_int(name, (value,))
+        return shader
+
+    def _join_all(self, bind: _Bind, found: bool) -> None:
+        """Gives the pending hits of ``bind`` their patches; without ``found`` none is new."""
+        first_new = self.count
+        self._reserve_table(self.count + (bind.count if found else 0))
+        items, item_count = bind.bound, -1  # all hits; the texture stands in for a list that is not read
+        for variant in range(VARIANTS):
+            before = self._totals[0]
+            self._claim(bind, items, item_count, variant, found)
+            if found:
+                self._number(bind, items, item_count, variant)
+            last = variant == VARIANTS - 1
+            self._join(bind, items, item_count, first_new, before, last)
+            if last or bind.count <= _FEW:
+                continue
+            items, item_count = self._pending(bind, items, item_count)
+            if item_count == 0:
+                break
+        if found:
+            self.count = _number_in(self._totals[0])
+            self._choose_points(bind, first_new)
+
+    def _claim(self, bind: _Bind, items, item_count: int, variant: int, found: bool) -> None:
+        shader = program("patch_claim_comp")
+        for name, texture in (
+            ("items", items),
+            ("bound", bind.bound),
+            ("hit_keys", bind.keys),
+            ("patch_keys", self._keys.texture),
+        ):
+            shader.uniform_sampler(name, texture)
+        for name, texture in (("table", self._table), ("leaders", self._leaders), ("slots", bind.slots)):
+            shader.image(name, texture)
+        for name, value in (
+            ("item_count", item_count),
+            ("hit_count", bind.count),
+            ("variant", variant),
+            ("table_mask", self._places - 1),
+            ("found", int(found)),
+        ):
+            shader.uniform_int(name, (value,))
+        dispatch_linear(shader, bind.entries(item_count))
+
+    def _number(self, bind: _Bind, items, item_count: int, variant: int) -> None:
+        """Makes patches of the cells that were claimed."""
+        counts = self._compact("patch_count_comp", bind, items, item_count, leaders=True)
+        entries = bind.entries(item_count)
+        if entries <= _FEW:
+            self._reserve(self.count + (variant + 1) * entries)
+        else:
+            blocks = -(-entries // _BLOCK)
+            known = _number_in(self._totals[0])
+            self._reserve(known + int(read(counts, blocks, channels=1).sum()))
+        shader = self._compaction("patch_number_comp", bind, items, item_count, leaders=True)
+        for name, texture in (
+            ("block_counts", counts),
+            ("total_in", self._totals[0]),
+            ("hit_keys", bind.keys),
+            ("hits", bind.hits),
+        ):
+            shader.uniform_sampler(name, texture)
+        for name, texture in (
+            ("total_out", self._totals[1]),
+            ("patch_keys", self._keys.texture),
+            ("patch_points", self._points.texture),
+        ):
+            shader.image(name, texture)
+        shader.uniform_int("variant", (variant,))
+        gpu.compute.dispatch(shader, -(-entries // _BLOCK), 1, 1)
+        self._totals.reverse()
+
+    def _join(self, bind: _Bind, items, item_count: int, first_new: int, before, last: bool) -> None:
+        shader = program("patch_join_comp", **bind.view, **self._scene.ray_defines)
+        self._scene.bind_rays(shader)
+        for name, texture in (
+            ("items", items),
+            ("slots", bind.slots),
+            ("hits", bind.hits),
+            ("patch_points", self.points),
+            ("total_before", before),
+            ("table", self._table),
+            ("leaders", self._leaders),
+        ):
+            shader.uniform_sampler(name, texture)
+        shader.image("bound", bind.bound)
+        shader.image("candidates", self._candidates.texture)
+        if "HAS_VIEW" in bind.view:
+            shader.image("seen", self.seen)
+        for name, value in (
+            ("item_count", item_count),
+            ("hit_count", bind.count),
+            ("first_new", first_new),
+            ("row_length", bind.row_length),
+            ("is_last", int(last)),
+        ):
+            shader.uniform_int(name, (value,))
+        dispatch_linear(shader, bind.entries(item_count))
+
+    def _pending(self, bind: _Bind, items, item_count: int) -> tuple[gpu.types.GPUTexture, int]:
+        """The hits that are still without a patch, in order."""
+        counts = self._compact("patch_count_comp", bind, items, item_count)
+        entries = bind.entries(item_count)
+        listed = allocate(entries, "hits", "R32F")
+        total = gpu.types.GPUTexture((1, 1), format="R32F")
+        shader = self._compaction("patch_pending_comp", bind, items, item_count)
+        shader.uniform_sampler("block_counts", counts)
+        shader.image("total_out", total)
+        shader.image("pending", listed)
+        gpu.compute.dispatch(shader, -(-entries // _BLOCK), 1, 1)
+        return listed, _number_in(total)
+
+    def _compact(self, name: str, bind: _Bind, items, item_count: int, leaders: bool = False):
+        shader = self._compaction(name, bind, items, item_count, leaders)
+        blocks = -(-bind.entries(item_count) // _BLOCK)
+        counts = allocate(blocks, "hits", "R32F")
+        shader.image("block_counts", counts)
+        gpu.compute.dispatch(shader, blocks, 1, 1)
+        return counts
+
+    def _compaction(self, name: str, bind: _Bind, items, item_count: int, leaders: bool = False):
+        shader = program(name, LEADERS=leaders)
+        shader.uniform_sampler("items", items)
+        shader.uniform_sampler("bound", bind.bound)
+        if leaders:
+            shader.uniform_sampler("slots", bind.slots)
+            shader.image("table", self._table)
+            shader.image("leaders", self._leaders)
+        shader.uniform_int("item_count", (item_count,))
+        shader.uniform_int("hit_count", (bind.count,))
+        return shader
+
+    def _choose_points(self, bind: _Bind, first_new: int) -> None:
+        shader = program("patch_points_comp")
+        shader.uniform_sampler("hits", bind.hits)
+        shader.uniform_sampler("candidates", self._candidates.texture)
+        shader.image("patch_points", self.points)
+        shader.uniform_int("first_new", (first_new,))
+        shader.uniform_int("patch_count", (self.count,))
+        dispatch_linear(shader, self.count - first_new)
+
+    # Room
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def _reserve(self, patches: int) -> None:
+        self._keys.reserve(patches)
+        self._seen.reserve(patches)
+        self._points.reserve(patches * POINTS)
+        self._candidates.reserve(patches * POINTS)
+
+    def _reserve_table(self, patches: int) -> None:
+        """A table that is at most half full with so many patches."""
+        places = 1 << max(2 * patches, 1 << 16).bit_length()
+        if places <= self._places:
+            return
+        if places > _MOST_PLACES:
+            raise InputError("the probes see more surface than the GPU can number; bake a smaller part of the scene")
+        self._places = places
+        self._table = allocate_integers(places, "patches", _FREE)
+        self._leaders = allocate_integers(places, "patches", _NOBODY)
+        shader = program("patch_table_comp")
+        shader.uniform_sampler("patch_keys", self._keys.texture)
+        shader.image("table", self._table)
+        shader.uniform_int("patch_count", (self.count,))
+        shader.uniform_int("table_mask", (places - 1,))
+        dispatch_linear(shader, self.count)
+
+
+class _Bind:
+    """Hits that ask for patches, and what is noted of each."""
+
+    def __init__(self, hits: gpu.types.GPUTexture, count: int, row_length: int, view: dict):
+        """``row_length``: hits in a row, whose neighbours lie side by side; ``view``: defines of texels."""
+        self.hits, self.count, self.row_length, self.view = hits, count, row_length, view
+        self.keys = allocate(count, "hits")
+        self.slots = allocate(count, "hits", "R32F")
+        self.bound = allocate(count, "hits", "R32F")
+
+    def entries(self, item_count: int) -> int:
+        return self.count if item_count < 0 else item_count
+
+
+def _number_in(texture: gpu.types.GPUTexture) -> int:
+    buffer = texture.read()
+    buffer.dimensions = 1
+    return int(buffer[0])
