@@ -19,6 +19,7 @@ HELP = "measures speed against error, peers side by side"
 NEEDS_BLENDER = NEEDS_GPU = False  # this process only starts others, which have both
 
 
+DEFAULT = "peers"
 # name -> (what it measures, seconds that it may take unless --limit says something else)
 BENCHMARKS = {
     "peers": ("the gallery by our bake, Cycles panoramas and EEVEE", 1800.0),
@@ -34,8 +35,7 @@ def add_arguments(parser, in_blender: bool) -> None:
         metavar="NAME",
         nargs="?",
         choices=BENCHMARKS,
-        default="peers",
-        help="; ".join(f"{name}: {what}" for name, (what, _) in BENCHMARKS.items()) + " (default %(default)s)",
+        help="; ".join(f"{name}: {what}" for name, (what, _) in BENCHMARKS.items()) + f" (default {DEFAULT})",
     )
     parser.add_argument("-o", "--output", metavar="DIR", help="folder for NAME.txt, NAME.json and NAME.svg")
     parser.add_argument(
@@ -112,6 +112,10 @@ def run(args, reporter, should_stop):
 
         return bench_measure.measure(json.loads(args.measure), reporter, should_stop)
     check(args)
+    if args.name is None:
+        others = "; ".join(f"{name}, {what}" for name, (what, _) in BENCHMARKS.items() if name != DEFAULT)
+        reporter.note(f"no name was given, so this is {DEFAULT}: {BENCHMARKS[DEFAULT][0]}. There are also {others}")
+        args.name = DEFAULT
     benchmark = importlib.import_module(f".bench_{args.name}", __package__)
     if args.limit is None:
         args.limit = BENCHMARKS[args.name][1]

@@ -108,6 +108,8 @@ def test_eevee_bakes_the_same_volume_or_says_why_not(run_gridlight):
         ("--limit", "nan"),
         ("--face", "1"),
         ("--eevee-samples", "-1"),
+        ("--budget", "0"),
+        ("--scene", "/no/such.blend"),
         ("-o", "/dev/null/x"),
     ],
 )
@@ -115,6 +117,69 @@ def test_wrong_options_are_refused_before_anything_runs(run_gridlight, arguments
     done = run_gridlight("bench", "peers", *arguments)
     assert done.returncode == 2
     assert done.stdout == "" and len(done.stderr.splitlines()) == 1
+
+
+def children(request):
+    """What the process that measures ``request`` reports; it must end by itself."""
+    reports, problem = bench_process.measure_in_child(request, 300, ["--quiet"], in_blender=False, verbose=False)
+    assert problem == ""
+    return reports
+
+
+def test_scaling_reports_sizes_until_the_time_is_up():
+    sweeps = [{"name": "triangles", "parameter": "triangles", "capture": "trace", "sizes": [1000, 4000, 1 << 30]}]
+    base = {"probes": 18, "triangles": 1000, "face": 4}
+    reports = children({"peer": "scaling", "seconds": 100, "base": base, "settings": {}, "sweeps": sweeps})
+    rows = [report for report in reports if "run" in report]
+    assert [row["size"] for row in rows] == [1000, 4000]
+    assert [round(row["triangles"], -3) for row in rows] == [1000, 4000]
+    for row in rows:
+        assert row["capture"] == "trace" and row["probes"] == 18 and row["face"] == 4
+        assert {"read", "capture", "finding patches", "rays, bounces", "field"} <= set(row["phases"])
+        assert sum(row["phases"].values()) == pytest.approx(row["seconds"], rel=0.3)
+    left_out = next(report["left_out"] for report in reports if "left_out" in report)
+    assert left_out["from"] == 1 << 30 and left_out["expected_seconds"] > 100
+    assert next(report["cold"] for report in reports if "cold" in report)["seconds"] > 0
+
+
+@pytest.mark.nightly
+def test_error_over_time_of_a_room(run_gridlight, tmp_path):
+    """All peers that are here; the ones that are not say what is missing."""
+    room = ("--scene", "cornell", "--panoramas", 2, "--error-nodes", 4, "--error-spp", 8, "--budget", 400)
+    done = run_gridlight("bench", "pareto", *room, "--face", 8, "--quiet", "-o", tmp_path)
+    assert done.returncode == 0, done.stderr
+    (part,) = json.loads(done.stdout.splitlines()[-1])["scenes"]
+    rows = {(row["peer"], row["setting"]): row for row in part["rows"]}
+    assert rows["Gridlight", "default"]["error"]["relative_rms"] < 0.1
+    assert rows["Cycles panoramas", "64×32, 8 samples"]["error"]["relative_rms"] < 0.1
+    for row in part["rows"]:
+        assert row["seconds"] is not None or row["problem"]
+    three = [row for row in part["rows"] if row["peer"] == "three.js"]
+    assert three and (three[0]["problem"] if three[0]["seconds"] is None else three[-1]["error"]["relative_rms"] < 0.5)
+    assert sorted(path.suffix for path in tmp_path.iterdir()) == [".json", ".svg", ".txt"]
+
+
+@pytest.mark.nightly
+def test_frame_says_where_the_time_goes():
+    reports = children({"peer": "frame", "scene": "cornell", "seconds": 60, "moves": 3, "settings": {"face": 8}})
+    rows = {report["run"]: report for report in reports if "run" in report}
+    assert {"slice", "relight, sliced", "picture", "relight, whole, phases waited for"} <= set(rows)
+    for row in rows.values():
+        assert 0 < row["median"] <= row["percentile_99"]
+    assert rows["slice"]["count"] > rows["relight, sliced"]["count"]
+    merged = {key: value for report in reports for key, value in report.items()}
+    shaders = merged["shaders"]
+    assert {"patch_direct_comp", "patch_iterate_comp", "field_project_comp"} <= set(shaders)
+    assert sum(cost["seconds"] for cost in shaders.values()) < merged["profiled_seconds"]
+    assert all(cost["bytes"] > 0 and cost["dispatches"] > 0 for cost in shaders.values())
+    assert min(merged["limits"].values()) > 0
+
+
+def test_a_browser_that_is_missing_is_named(monkeypatch):
+    monkeypatch.setenv("PATH", "/nowhere")
+    request = {"peer": "three", "scene": "cornell", "nodes": [], "settings": [], "software": True, "seconds": 9}
+    reports, problem = bench_process.measure_in_child(request, 60, ["--quiet"], in_blender=False, verbose=False)
+    assert "chromium is not here" in problem and "apt-get install" in problem
 
 
 def test_unknown_benchmark_is_refused(run_gridlight):
