@@ -27,7 +27,7 @@ def choose_capture(settings: BakeSettings, triangle_count: int, probe_count: int
     """("raster" or "trace", why). ``auto`` needs a GPU context; the first call on a device measures it."""
     if settings.capture != "auto":
         return settings.capture, f"capture by {settings.capture}, as asked for"
-    cost = _device_cost()
+    cost = device_cost()
     probes, face = max(probe_count, 1), settings.face
     limit = cost.crossover(probes, face)
     method = "raster" if triangle_count <= limit else "trace"
@@ -39,7 +39,8 @@ def choose_capture(settings: BakeSettings, triangle_count: int, probe_count: int
 
 
 @cache
-def _device_cost() -> CaptureCost:
+def device_cost() -> CaptureCost:
+    """The model of this device, measured where it is not known yet. Needs a GPU context."""
     key = " | ".join(
         (device_description(), f"Blender {bpy.app.version_string}", f"{platform.machine()}, {os.cpu_count()} cores")
     )

@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 
+from ..bake.capture_choice import device_cost
 from ..bake.job import drive
 from ..bake.session import BakeSession
 from ..core.errors import GridlightError
@@ -37,7 +38,17 @@ def scaling(request: dict, reporter, should_stop) -> None:
     started = time.perf_counter()
     ensure_context()
     bake = _Bakes(request["settings"], should_stop)
-    report({"device": device_description(), "blender": _blender(), "context_seconds": time.perf_counter() - started})
+    context_seconds = time.perf_counter() - started
+    started = time.perf_counter()
+    device_cost()
+    report(
+        {
+            "device": device_description(),
+            "blender": _blender(),
+            "context_seconds": context_seconds,
+            "trial_seconds": time.perf_counter() - started,
+        }
+    )
     running: dict[str, tuple[dict, list]] = {sweep["name"]: (sweep, []) for sweep in request["sweeps"]}
     for turn in range(max(len(sweep["sizes"]) for sweep in request["sweeps"])):
         for name, (sweep, done) in list(running.items()):
@@ -123,6 +134,7 @@ class _Bakes:
         session = BakeSession(self._snapshot, grid, settings, clock, stopwatch=clock)
         drive(session.bake(), self._should_stop)
         result = session.result
+        predict = getattr(device_cost(), result.capture)
         return {
             "seconds": time.perf_counter() - started,
             "probes": grid.count,
@@ -133,6 +145,7 @@ class _Bakes:
             "iterations": result.iterations,
             "converged": result.converged,
             "resident": not any("memory budget" in note for note in result.notes),
+            "predicted_capture": predict(grid.count, len(self._snapshot.triangles), case["face"]),
             "phases": clock.phases,
         }
 

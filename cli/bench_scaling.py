@@ -51,9 +51,51 @@ def measure(run: Run) -> dict:
         "device": merged["device"],
         "blender": merged["blender"],
         "base": BASE,
-        "cold": {"context_seconds": merged["context_seconds"], "variants": [r["cold"] for r in reports if "cold" in r]},
+        "cold": {
+            "context_seconds": merged["context_seconds"],
+            "trial_seconds": merged["trial_seconds"],
+            "variants": [report["cold"] for report in reports if "cold" in report],
+        },
+        "crossover_triangles": crossover(*(_rows_of(sweeps, name) for name in ("triangles, rasterised", "triangles"))),
         "sweeps": sweeps,
         "problem": merged.get("problem"),
+    }
+
+
+def _rows_of(sweeps: list[dict], name: str) -> list[dict]:
+    return next(sweep["rows"] for sweep in sweeps if sweep["name"] == name)
+
+
+def crossover(rasterised: list[dict], traced: list[dict]) -> float | None:
+    """Triangles at which both captures took the same time, between two sizes that both measured; None where they never
+    did."""
+    by_size = {row["size"]: row for row in traced}
+    pairs = [(row, by_size[row["size"]]) for row in rasterised if row["size"] in by_size]
+    lead = [np.log(raster["phases"]["capture"] / trace["phases"]["capture"]) for raster, trace in pairs]
+    for index in range(1, len(pairs)):
+        if lead[index - 1] <= 0 < lead[index]:
+            share = lead[index - 1] / (lead[index - 1] - lead[index])
+            low, high = (np.log(pairs[at][0]["triangles"]) for at in (index - 1, index))
+            return float(np.exp(low + share * (high - low)))
+    return None
+
+
+def growth(rows: list[dict]) -> dict[str, float] | None:
+    """By how much rays and all light of a bake grow per probe from 10 000 triangles to the most; None where the range
+    was not measured. Reading the scene and building the hierarchy, which no probe adds to, are left out."""
+    middle = [row for row in rows if row["size"] == BASE["triangles"]]
+    if not middle or rows[-1]["size"] <= BASE["triangles"]:
+        return None
+    first, last = middle[0], rows[-1]
+
+    def per_probe(row: dict) -> float:
+        phases = row["phases"]
+        return (row["seconds"] - phases["read"] - phases.get("hierarchy, upload", 0.0)) / row["probes"]
+
+    return {
+        "to": last["triangles"],
+        "capture": last["phases"]["capture"] / first["phases"]["capture"],
+        "bake": per_probe(last) / per_probe(first),
     }
 
 
@@ -84,7 +126,8 @@ def table(summary: dict) -> list[str]:
     lines.append("Exponent: of growth with the size, fitted to all sizes; 1 is in proportion.")
     cold = summary["cold"]
     lines.append(
-        f"Cold: GPU context {bench_table.significant(cold['context_seconds'])} s; first bake of 30 probes and 1000 "
+        f"Cold: GPU context {bench_table.significant(cold['context_seconds'])} s, trial captures "
+        f"{bench_table.significant(cold['trial_seconds'])} s where they are not kept; first bake of 30 probes and 1000 "
         "triangles, which compiles shaders: "
         + ", ".join(
             f"{item['capture']}, face {item['face']}: {bench_table.significant(item['seconds'])}"
@@ -93,6 +136,11 @@ def table(summary: dict) -> list[str]:
     )
     for sweep in summary["sweeps"]:
         lines += ["", *_sweep_table(sweep)]
+    both = summary["crossover_triangles"]
+    lines += [
+        "",
+        f"Both captures cost the same at {'no size in both sweeps' if both is None else f'{both:.0f} triangles'}.",
+    ]
     if summary["problem"]:
         lines += ["", f"ended early: {summary['problem']}"]
     return lines
@@ -103,22 +151,31 @@ def _sweep_table(sweep: dict) -> list[str]:
     lines = [f"{sweep['name']} ({sweep['capture']})"]
     if rows:
         names = phases_of(rows)
-        cells = [[sweep["parameter"], "patches", *names, "whole", "µs/probe"]]
+        cells = [[sweep["parameter"], "patches", *names, "whole", "µs/probe", "capture predicted"]]
         for row in rows:
             size = {"probes": row["probes"], "triangles": row["triangles"], "face": row["face"]}[sweep["parameter"]]
             seconds = [row["phases"].get(name, 0.0) for name in names]
             cells.append(
                 [
-                    str(size),
+                    f"{size}{'' if row['resident'] else '*'}",
                     str(row["patches"]),
                     *[bench_table.significant(value) for value in [*seconds, row["seconds"]]],
                     bench_table.significant(1e6 * row["seconds"] / row["probes"]),
+                    bench_table.significant(row["predicted_capture"]),
                 ]
             )
         if sweep["exponents"]:
             fitted = [sweep["exponents"].get(name, math.nan) for name in [*names, "whole"]]
             cells.append(["exponent", "", *["–" if math.isnan(v) else f"{v:.2f}" for v in fitted]])
         lines += bench_table.columns(cells)
+    if not all(row["resident"] for row in rows):
+        lines.append("* more than the memory budget holds: captured again whenever texels are needed")
+    grown = growth(rows) if sweep["parameter"] == "triangles" else None
+    if grown:
+        lines.append(
+            f"from {BASE['triangles']} to {grown['to']} triangles a probe's capture grows {grown['capture']:.2f} times, "
+            f"its part of the bake without reading and hierarchy {grown['bake']:.2f} times"
+        )
     if sweep["left_out"]:
         item = sweep["left_out"]
         why = item.get("reason") or f"about {bench_table.significant(item['expected_seconds'])} s more than is left"

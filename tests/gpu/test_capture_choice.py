@@ -20,16 +20,16 @@ pytestmark = pytest.mark.usefixtures("gpu_context")
 @pytest.fixture
 def cache(tmp_path, monkeypatch):
     monkeypatch.setenv("GRIDLIGHT_CACHE", str(tmp_path / "cache"))
-    capture_choice._device_cost.cache_clear()
+    capture_choice.device_cost.cache_clear()
     yield tmp_path / "cache"
-    capture_choice._device_cost.cache_clear()
+    capture_choice.device_cost.cache_clear()
 
 
 def test_the_device_is_measured_once_and_the_choice_stays(cache, monkeypatch):
     first = capture_choice.choose_capture(BakeSettings(), 5000, 300)
     kept = json.loads(next(cache.iterdir()).read_text(encoding="utf-8"))
     assert kept["values"]["raster_many"] > 0 and "Blender" in kept["key"]
-    capture_choice._device_cost.cache_clear()  # as in the next process
+    capture_choice.device_cost.cache_clear()  # as in the next process
     monkeypatch.setattr(capture_choice, "time_captures", lambda: pytest.fail("measured again"))
     assert capture_choice.choose_capture(BakeSettings(), 5000, 300) == first
 

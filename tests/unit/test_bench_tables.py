@@ -17,6 +17,26 @@ def test_exponents_of_powers_are_found():
     assert found == pytest.approx({"rays": 2.0, "field": 0.0, "whole": 1.5})
 
 
+def test_the_crossover_lies_where_both_captures_take_the_same_time():
+    def rows(seconds_of):
+        return [{"size": n, "triangles": n, "phases": {"capture": seconds_of(n)}} for n in (1000, 10_000, 100_000)]
+
+    rasterised, traced = rows(lambda n: 1e-6 * n), rows(lambda n: 2e-2)
+    assert bench_scaling.crossover(rasterised, traced) == pytest.approx(20_000)
+    assert bench_scaling.crossover(traced, rasterised) is None
+    assert bench_scaling.crossover(rasterised[:1], traced) is None
+
+
+def test_growth_is_told_from_ten_thousand_triangles_on():
+    def hall(size, capture, light):
+        phases = {"read": 1.0, "capture": capture, "light": light}
+        return {"size": size, "triangles": size, "probes": 10, "seconds": sum(phases.values()), "phases": phases}
+
+    rows = [hall(1000, 1.0, 1.0), hall(10_000, 2.0, 2.0), hall(1_000_000, 3.0, 4.0)]
+    assert bench_scaling.growth(rows) == pytest.approx({"to": 1_000_000, "capture": 1.5, "bake": 7 / 4})
+    assert bench_scaling.growth(rows[:2]) is None
+
+
 def test_two_sizes_tell_no_exponent():
     assert bench_scaling.exponents([row(1, 1.0), row(2, 2.0)]) == {}
 
