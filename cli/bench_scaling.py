@@ -173,8 +173,8 @@ def _sweep_table(sweep: dict) -> list[str]:
     grown = growth(rows) if sweep["parameter"] == "triangles" else None
     if grown:
         lines.append(
-            f"from {BASE['triangles']} to {grown['to']} triangles a probe's capture grows {grown['capture']:.2f} times, "
-            f"its part of the bake without reading and hierarchy {grown['bake']:.2f} times"
+            f"from {BASE['triangles']} to {grown['to']} triangles a probe's capture grows {grown['capture']:.2f} "
+            f"times, its part of the bake without reading and hierarchy {grown['bake']:.2f} times"
         )
     if sweep["left_out"]:
         item = sweep["left_out"]
