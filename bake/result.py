@@ -23,6 +23,22 @@ class Reporter(Protocol):
     def warn(self, text: str) -> None: ...
 
 
+class Silent:
+    """A reporter for bakes that nobody waits for."""
+
+    def phase(self, name: str, total: int | None = None) -> None:
+        pass
+
+    def advance(self, amount: int = 1) -> None:
+        pass
+
+    def note(self, text: str) -> None:
+        pass
+
+    def warn(self, text: str) -> None:
+        pass
+
+
 @dataclass
 class Relit:
     """What a relight did, in numbers; everything else was kept."""

@@ -10,7 +10,6 @@ import time
 from dataclasses import asdict, replace
 from pathlib import Path
 
-import bpy
 import numpy as np
 
 from ..bake.job import drive
@@ -21,7 +20,7 @@ from ..core.field import Field
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..core.view import View
-from ..gpu_shaders.context import device_description, ensure_context
+from ..gpu_shaders.context import ensure_context
 from ..gpu_shaders.dispatch_profile import limits, profiled
 from ..gpu_shaders.fence import Fence
 from ..gpu_shaders.scene_textures import SceneTextures
@@ -32,7 +31,7 @@ from ..scene.read import read_scene
 from ..viewport.live_bake import LiveBake, Target
 from . import bench_scenes
 from .bench_measure import report
-from .bench_measure_peers import load_scene
+from .bench_measure_peers import facts_about, load_scene
 from .bench_phases import PhaseClock
 
 WIDTH, HEIGHT = 1920, 1080
@@ -63,21 +62,9 @@ def frame(request: dict, reporter, should_stop) -> None:
     fields = _follow(live, snapshot, target, settings, math.inf)[0]
     cold = time.perf_counter() - started
     field = fields[grid.name]
-    report(
-        {
-            "device": device_description(),
-            "blender": bpy.app.version_string,
-            "scene": {
-                "name": request["scene"],
-                "triangles": len(snapshot.triangles),
-                "locations": grid.count,
-                "active": int((field.state == ACTIVE).sum()),
-                "lights": len(snapshot.lights),
-            },
-            "cold_bake_seconds": cold,
-            "picture": [WIDTH, HEIGHT],
-        }
-    )
+    facts = facts_about(request["scene"], snapshot, grid)
+    facts["scene"] |= {"active": int((field.state == ACTIVE).sum()), "lights": len(snapshot.lights)}
+    report({**facts, "cold_bake_seconds": cold, "picture": [WIDTH, HEIGHT]})
     view = _Views(snapshot, field)
     _moves(request, live, snapshot, target, settings, view, ends, reporter, should_stop)
     reporter.phase("where the time goes")

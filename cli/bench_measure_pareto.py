@@ -5,16 +5,15 @@ from __future__ import annotations
 
 import time
 
-import bpy
 import numpy as np
 
 from ..bake.job import run_bake
 from ..core.settings import BakeSettings
-from ..gpu_shaders.context import device_description, ensure_context
+from ..gpu_shaders.context import ensure_context
 from ..scene.read import read_scene
 from . import bench_scenes
 from .bench_measure import report
-from .bench_measure_peers import free_nodes, irradiance_at, load_scene
+from .bench_measure_peers import facts_about, free_nodes, irradiance_at, load_scene
 from .verify_points import FreeSpace
 
 _MOST_RUNS, _REPEAT_SECONDS = 7, 1.0  # warm bakes of each setting, until one of the two is reached
@@ -33,18 +32,7 @@ def settings_in_turn(request: dict, reporter, should_stop) -> None:
     snapshot = read_scene(scene)
     read_seconds = time.perf_counter() - started
     grid = bench_scenes.grid_of(request["scene"], snapshot)
-    report(
-        {
-            "device": device_description(),
-            "blender": bpy.app.version_string,
-            "scene": {
-                "name": request["scene"],
-                "triangles": len(snapshot.triangles),
-                "locations": grid.count,
-                "resolution": list(grid.resolution),
-            },
-        }
-    )
+    report(facts_about(request["scene"], snapshot, grid))
     nodes = request["nodes"]
     ends, dearest = time.perf_counter() + request["seconds"], 0.0
     for values in request["settings"]:

@@ -22,6 +22,7 @@ from ..core import spherical_harmonics as sh
 from ..core.conventions import ACTIVE
 from ..core.errors import Cancelled, InputError
 from ..core.field import Field
+from ..core.grid import Grid
 from ..core.panorama import panorama_irradiance, project_panorama
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
@@ -52,23 +53,17 @@ def gridlight(request: dict, reporter, should_stop) -> int:
     report({**median_row(warm), "runs": len(warm)})
     result, snapshot = last.result, last.snapshot
     grid = result.field.grid
+    facts = facts_about(request["scene"], snapshot, grid)
+    facts["scene"]["probes"] = result.counts
     report(
         {
-            "blender": bpy.app.version_string,
-            "scene": {
-                "name": request["scene"],
-                "locations": grid.count,
-                "resolution": list(grid.resolution),
-                "triangles": len(snapshot.triangles),
-                "probes": result.counts,
-            },
+            **facts,
             "bake": {
                 "iterations": result.iterations,
                 "converged": result.converged,
                 "capture": result.capture,
                 "notes": result.notes,
             },
-            "device": device_description(),
         }
     )
     if request["nodes"]:
@@ -77,6 +72,20 @@ def gridlight(request: dict, reporter, should_stop) -> int:
         report({"nodes": nodes.tolist(), "irradiance": irradiance_at(result.field, nodes).tolist()})
     reporter.finish()
     return 0 if result.converged or settings.bounces is not None else pipeline.NOT_CONVERGED
+
+
+def facts_about(name: str, snapshot: SceneSnapshot, grid: Grid) -> dict:
+    """Device, Blender and scene, for the heads of tables. Needs a GPU context."""
+    return {
+        "device": device_description(),
+        "blender": bpy.app.version_string,
+        "scene": {
+            "name": name,
+            "triangles": len(snapshot.triangles),
+            "locations": grid.count,
+            "resolution": list(grid.resolution),
+        },
+    }
 
 
 def median_row(rows: list[dict]) -> dict:

@@ -89,13 +89,13 @@ def _write(path: Path, value: dict) -> None:
 
 def _packages() -> Path:
     """node_modules with three.js, kept in the user's cache folder."""
-    folder = user_cache.folder() / "three"
     try:
+        folder = user_cache.folder() / "three"
         folder.mkdir(parents=True, exist_ok=True)
         for name in ("package.json", "package-lock.json"):
             content = (_PAGE / name).read_bytes()
             if not (folder / name).is_file() or (folder / name).read_bytes() != content:
                 shutil.copy(_PAGE / name, folder / name)
     except OSError as error:
-        raise InputError(f"cannot write to {folder}: {error.strerror}; name another with GRIDLIGHT_CACHE") from None
+        raise InputError(f"three.js has no place: {error}; name a folder with GRIDLIGHT_CACHE") from None
     return headless_browser.install_packages(folder)

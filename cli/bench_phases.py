@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from contextlib import contextmanager
 
+from ..bake.result import Silent
 from ..bake.stopwatch import Stopwatch
 from ..gpu_shaders.fence import Fence
 
@@ -29,11 +30,11 @@ _NAMES = {
 NAMES = ("read", *dict.fromkeys(_NAMES.values()))
 
 
-class PhaseClock(Stopwatch):
+class PhaseClock(Silent, Stopwatch):
     """``phases``: seconds by name, one of NAMES where it is known. Also the bake's reporter, a silent one."""
 
     def __init__(self):
-        super().__init__({})
+        Stopwatch.__init__(self, {})
         self.phases: dict[str, float] = {}
         self._fence = Fence()
         self._now = ""
@@ -49,14 +50,5 @@ class PhaseClock(Stopwatch):
         self.phases[name] = self.phases.get(name, 0.0) + spent
         self.seconds[phase] = self.seconds.get(phase, 0.0) + spent
 
-    def phase(self, name: str, _total: int | None = None) -> None:
+    def phase(self, name: str, total: int | None = None) -> None:
         self._now = name
-
-    def advance(self, amount: int = 1) -> None:
-        pass
-
-    def note(self, text: str) -> None:
-        pass
-
-    def warn(self, text: str) -> None:
-        pass

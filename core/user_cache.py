@@ -21,17 +21,28 @@ Kept = TypeVar("Kept")
 
 
 def folder() -> Path:
-    """GRIDLIGHT_CACHE, or "gridlight" in the system's place for caches (XDG_CACHE_HOME on Linux)."""
+    """GRIDLIGHT_CACHE, or "gridlight" in the system's place for caches (XDG_CACHE_HOME on Linux).
+
+    Raises:
+        OSError: the user has no home.
+    """
     named = os.environ.get("GRIDLIGHT_CACHE")
     if named:
-        return Path(named).expanduser()
+        return _at_home(named)
     if sys.platform == "win32":
         base = os.environ.get("LOCALAPPDATA") or "~/AppData/Local"
     elif sys.platform == "darwin":
         base = "~/Library/Caches"
     else:
         base = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    return Path(base).expanduser() / "gridlight"
+    return _at_home(base) / "gridlight"
+
+
+def _at_home(path: str) -> Path:
+    try:
+        return Path(path).expanduser()
+    except RuntimeError as error:
+        raise FileNotFoundError(f"{path}: {error}") from None
 
 
 def kept(name: str, key: str, check: Callable[[dict], Kept], measure: Callable[[], dict]) -> tuple[Kept, bool]:
@@ -46,7 +57,10 @@ def kept(name: str, key: str, check: Callable[[dict], Kept], measure: Callable[[
         (result, whether it is on disk now).
     """
     digest = hashlib.sha256(key.encode()).hexdigest()[:16]
-    path = folder() / f"{name}-{digest}.json"
+    try:
+        path = folder() / f"{name}-{digest}.json"
+    except OSError:
+        return check(measure()), False
     try:
         return _read(path, key, check), True
     except (*_DAMAGE, OSError) as error:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..bake.result import Silent
 from ..bake.session import BakeSession
 from ..core.errors import GridlightError
 from ..core.field import Field
@@ -93,26 +94,10 @@ class LiveBake:
             if session is not None and session.settings == settings and known.equals(target):
                 steps = session.relight(snapshot)
             else:
-                session = BakeSession(snapshot, target.grid, settings, _Silent(), target.edits)
+                session = BakeSession(snapshot, target.grid, settings, Silent(), target.edits)
                 steps = session.bake()
             for _ in steps:
                 yield {}
             self._kept[name] = (target, session)
             fields[name] = session.result.field
         yield fields
-
-
-class _Silent:
-    """A reporter for bakes that nobody asked for by name."""
-
-    def phase(self, name: str, total: int | None = None) -> None:
-        pass
-
-    def advance(self, amount: int = 1) -> None:
-        pass
-
-    def note(self, text: str) -> None:
-        pass
-
-    def warn(self, text: str) -> None:
-        pass

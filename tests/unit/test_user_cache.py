@@ -61,6 +61,16 @@ def test_without_a_folder_it_is_measured_every_time(monkeypatch, tmp_path):
     assert user_cache.kept("speed", "device", number, lambda: {"number": 4}) == (4.0, False)
 
 
+def test_a_user_without_a_home_keeps_nothing(monkeypatch):
+    def homeless(_path):
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("GRIDLIGHT_CACHE")
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(user_cache.Path, "expanduser", homeless)
+    assert user_cache.kept("speed", "device", number, lambda: {"number": 3}) == (3.0, False)
+
+
 def test_all_who_measure_at_once_go_on_with_one_value(cache):
     results, together = [], threading.Barrier(8)
 
