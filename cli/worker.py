@@ -12,6 +12,7 @@ death by signal into one plain line. Three descriptors go to the child:
 
 from __future__ import annotations
 
+import ctypes
 import faulthandler
 import os
 import signal
@@ -67,8 +68,12 @@ def _end_with_parent(parent_alive: int) -> None:
 
 
 def write_result(text: str) -> None:
-    """Writes ``text`` to the standard output that the user sees."""
+    """Writes ``text`` to the standard output that the user sees, below whatever Blender has printed."""
     stream = _result_stream or sys.stdout
+    if _result_stream is None:
+        # In a pipe, what C has printed waits until the process ends: Blender's banner would come last.
+        stream.flush()
+        ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None).fflush(None)
     stream.write(text)
     stream.flush()
 
