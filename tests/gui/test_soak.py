@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hours of use: random sessions, one after the other, hold no more memory and GPU objects than after the first minute.
+
+``scripts/soak`` runs it; GRIDLIGHT_SOAK_MINUTES says how long. What was measured goes to soak.csv beside the pictures.
+"""
+
+import gc
+import importlib.util
+import os
+import time
+from pathlib import Path
+
+import bpy
+from harness import in_blender
+from test_sequences import User
+
+MINUTES = float(os.environ.get("GRIDLIGHT_SOAK_MINUTES", "6"))
+STEPS = 25  # of a session
+FIRST_MINUTE = 60.0
+GROWTH = 1.05
+
+
+@in_blender(backends=("opengl",), timeout=60 * MINUTES + 600, nightly_cases=[0])
+def test_hours_of_use_hold_no_more_than_the_first_minute(person, seed):
+    rows = []
+    started = time.monotonic()
+    while (seconds := time.monotonic() - started) < 60 * MINUTES or len(rows) < 3:
+        user = BusyUser(person, seed)
+        yield from user.start()
+        if not rows:  # whatever is made once and kept, like shaders, is made in the first minute
+            for act in user.kinds():
+                yield from user.wait_for_bake()
+                yield from user.act(act)
+        for _ in range(STEPS):
+            yield from user.step()
+        yield from user.finish()
+        seed += 1
+        if not rows or seconds > FIRST_MINUTE:
+            rows.append(measured(seed, time.monotonic() - started))
+            write(rows)
+    first, last = rows[0], rows[-1]
+    for what in ("MiB", "textures", "buffers", "programs"):
+        assert last[what] <= GROWTH * first[what], (what, first, last)
+
+
+class BusyUser(User):
+    """Also moves lamps while the preview follows, walks through time, and loads other files."""
+
+    def __init__(self, person, seed):
+        super().__init__(person, seed)
+        self.other += [self.move_lights, self.move_lights, self.live, self.new_file]
+
+    def kinds(self):
+        """Everything that can be done, once each; undo last, for there must be something to undo."""
+        acts = {act.__name__: act for act in [*self.other, *self.harmless]}
+        return [*(act for name, act in acts.items() if name not in ("undo", "redo")), self.undo, self.redo]
+
+    def act(self, act):
+        self.said.append(act.__name__)
+        yield from act()
+        yield 0.05
+
+    def move_lights(self):
+        lamps = [item for item in bpy.context.scene.objects if item.type == "LIGHT"]
+        for _ in range(5):
+            for lamp in lamps:
+                lamp.location.x += self.random.uniform(-0.1, 0.1)
+            yield 0.1
+
+    def live(self):
+        preview = bpy.context.scene.gridlight.preview
+        preview.enabled = preview.live = True
+        yield 1.0
+
+    def new_file(self):
+        bpy.ops.wm.read_homefile(use_factory_startup=True)
+        yield 0.3
+        yield from self.start()
+
+
+def measured(sessions, seconds):
+    gc.collect()
+    path = Path(__file__).parents[1] / "process_size.py"
+    spec = importlib.util.spec_from_file_location("process_size", path)
+    process_size = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(process_size)
+    resident = round(process_size.resident_mib(), 1)
+    return {"sessions": sessions, "seconds": round(seconds), "MiB": resident, **process_size.gpu_objects()}
+
+
+def write(rows):
+    lines = [",".join(rows[0]), *(",".join(map(str, row.values())) for row in rows)]
+    Path(os.environ["GRIDLIGHT_PICTURES"], "soak.csv").write_text("\n".join(lines) + "\n")

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The manual does not contradict the program: links lead somewhere, and commands, options and files that it names exist."""
+
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+ROOMS = ("core", "scene", "gpu_shaders", "bake", "formats", "viewport", "operators", "panels", "cli", "farm", "tests")
+MAKE = re.compile(r"^([a-z]+):", re.MULTILINE)
+
+
+def anchors(text: str) -> set[str]:
+    """What a page's headings are called in links to it."""
+    titles = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    plain = [re.sub(r"[^\w\- ]", "", title.lower()) for title in titles]
+    return {title.replace(" ", "-") for title in plain}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
+def test_links_lead_somewhere(page):
+    text = page.read_text(encoding="utf-8")
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if target.startswith("http"):
+            continue
+        name, _, anchor = target.partition("#")
+        path = page.parent / name if name else page
+        assert path.exists(), f"{page.name} links to {target}"
+        if anchor:
+            assert anchor in anchors(path.read_text(encoding="utf-8")), f"{page.name} links to {target}"
+
+
+def options_of(command: str) -> set[str]:
+    from gridlight.cli.arguments import Parser
+
+    module = importlib.import_module(f"gridlight.cli.{command}")
+    parser = Parser(prog="gridlight")
+    module.add_arguments(parser, in_blender=False)
+    return {option for action in parser._actions for option in action.option_strings} | {"--verbose"}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
+def test_commands_and_options_exist(page):
+    from gridlight.cli.main import COMMANDS
+
+    for command, words in re.findall(r"(?:\./gridlight|--command gridlight) ([a-z]+)\b([^`|\n]*)", page.read_text()):
+        assert command in COMMANDS, f"{page.name}: gridlight {command}"
+        if command != "bench":  # its parts have options of their own
+            known = options_of(command)
+            for option in re.findall(r"(?<!\S)(--[a-z-]+)", words):
+                assert option in known, f"{page.name}: gridlight {command} {option}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
+def test_make_targets_exist(page):
+    targets = set(MAKE.findall((ROOT / "Makefile").read_text()))
+    for target in re.findall(r"(?:`|^ {4}|  )make ([a-z]+)", page.read_text(), re.MULTILINE):
+        assert target in targets, f"{page.name}: make {target}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
+def test_files_that_are_named_exist(page):
+    pattern = r"`((?:%s|docs|scripts)/[\w/]+\.(?:py|glsl|md|txt))" % "|".join(ROOMS)
+    for name in re.findall(pattern, page.read_text()):
+        assert "NAME" in name or (ROOT / name).exists(), f"{page.name} names {name}"
