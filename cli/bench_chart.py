@@ -30,6 +30,27 @@ class Scale:
         return [(value, f"{value:g}" if few or step == 1 else "") for value, step in ticks]
 
 
+class Labels:
+    """Puts texts near points, between ``left`` and ``right`` of the picture, so that they do not cover each other."""
+
+    _CHARACTER, _LINE = 7.2, 15  # room that a character and a line take
+
+    def __init__(self, left: float, right: float):
+        self._left, self._right = left, right
+        self._taken: list[tuple[float, float, float]] = []  # left, right, baseline
+
+    def beside(self, x: float, y: float, text: str) -> str:
+        """``text`` above (x, y), else below it, else further up; shifted inwards at the edges of the picture."""
+        width = self._CHARACTER * len(text)
+        left = min(max(x - width / 2, self._left + 4), self._right - 4 - width)
+        above = (y - 11 - self._LINE * step for step in range(20))
+        for baseline in (y - 11, y + 21, *above):
+            if all(left > r or left + width < l or abs(baseline - b) >= self._LINE for l, r, b in self._taken):
+                break
+        self._taken.append((left, left + width, baseline))
+        return f'<text x="{left + width / 2:.1f}" y="{baseline:.1f}" text-anchor="middle">{escape(text)}</text>'
+
+
 class Chart:
     """Series of points (x, y); those that are not greater than zero have no place here and are left out."""
 
@@ -41,7 +62,8 @@ class Chart:
         self._add(name, xs, ys, None, "dashed" if dashed else "line")
 
     def points(self, name: str, xs, ys, labels) -> None:
-        """Unconnected points, each with a text that appears under the pointer."""
+        """Unconnected points. Each has a text that appears under the pointer; those that no other of the series beats
+        in both directions show it."""
         self._add(name, xs, ys, labels, "points")
 
     def _add(self, name, xs, ys, labels, kind) -> None:
@@ -69,6 +91,7 @@ class Chart:
         parts.append(f'<text x="{middle}" y="{bottom + 36}" text-anchor="middle">{escape(self._across)}</text>')
         side = f"translate(18 {(top + _TOP + bottom) / 2}) rotate(-90)"
         parts.append(f'<text transform="{side}" text-anchor="middle">{escape(self._up)}</text>')
+        texts = Labels(_LEFT, _WIDTH - _RIGHT)
         for index, (name, points, kind) in enumerate(self._series):
             colour = COLOURS[index % len(COLOURS)]
             if kind != "points":
@@ -78,6 +101,8 @@ class Chart:
             for x, y, label in points:
                 tip = f"<title>{escape(f'{name}: {label}' if label else name)}</title>"
                 parts.append(f'<circle cx="{across(x):.1f}" cy="{up(y):.1f}" r="4" fill="{colour}">{tip}</circle>')
+            for x, y, label in _unbeaten(points) if kind == "points" else ():
+                parts.append(texts.beside(across(x), up(y), label))
             row = top + _TOP + 12 + 18 * index
             parts.append(
                 f'<rect x="{_WIDTH - _RIGHT + 14}" y="{row - 9}" width="11" height="11" fill="{colour}"/>'
@@ -101,6 +126,13 @@ def page(title: str, summary: dict, charts: list[Chart]) -> str:
         f'<text x="14" y="18" font-weight="bold">{escape(title)}</text>'
         f'<text x="14" y="34" font-size="11">{escape(device)}</text>{"".join(parts)}</svg>\n'
     )
+
+
+def _unbeaten(points: list[tuple[float, float, str]]) -> list[tuple[float, float, str]]:
+    """Those than which no other is lower in both coordinates."""
+    return [
+        (x, y, text) for x, y, text in points if not any(a <= x and b <= y and (a, b) != (x, y) for a, b, _ in points)
+    ]
 
 
 def _rule(x1: float, x2: float, y1: float, y2: float) -> list[str]:

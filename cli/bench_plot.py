@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from html import escape
 
-from .bench_chart import GREY, INK, Scale
+from .bench_chart import GREY, INK, Labels, Scale
 from .bench_table import significant
 
 _WIDTH, _LEFT, _RIGHT, _TOP, _BOTTOM = 860, 70, 40, 46, 46
@@ -83,7 +83,7 @@ def _error_over_time(summary: dict, rows: list[dict]) -> str:
             f'stroke-dasharray="2 4"/><text x="{_WIDTH - _RIGHT - 4}" y="{up(floor) - 6:.1f}" text-anchor="end">'
             f"floor of {reference['bands']} bands</text>"
         )
-    labels = _Labels()
+    labels = Labels(_LEFT, _WIDTH - _RIGHT)
     for row in rows:
         x, colour = across(row["seconds"]), _COLOURS[row["peer"]]
         if row["error"]:
@@ -104,26 +104,6 @@ def _error_over_time(summary: dict, rows: list[dict]) -> str:
             f'<text x="{left + 11}" y="18">{escape(peer)}</text>'
         )
     return _page(summary, height, "error over time", parts)
-
-
-class _Labels:
-    """Puts texts near points so that they do not cover each other."""
-
-    _CHARACTER, _LINE = 7.2, 15  # room that a character and a line take
-
-    def __init__(self):
-        self._taken: list[tuple[float, float, float]] = []  # left, right, baseline
-
-    def beside(self, x: float, y: float, text: str) -> str:
-        """``text`` above (x, y), else below it, else further up; shifted inwards at the edges of the picture."""
-        width = self._CHARACTER * len(text)
-        left = min(max(x - width / 2, _LEFT + 4), _WIDTH - _RIGHT - 4 - width)
-        above = (y - 11 - self._LINE * step for step in range(20))
-        for baseline in (y - 11, y + 21, *above):
-            if all(left > r or left + width < l or abs(baseline - b) >= self._LINE for l, r, b in self._taken):
-                break
-        self._taken.append((left, left + width, baseline))
-        return f'<text x="{left + width / 2:.1f}" y="{baseline:.1f}" text-anchor="middle">{escape(text)}</text>'
 
 
 def _page(summary: dict, height: int, title: str, parts: list[str]) -> str:
