@@ -98,6 +98,7 @@ def _add(scene, name: str, vertices: np.ndarray, quads: np.ndarray, material) ->
     mesh.polygons.add(len(quads))
     mesh.polygons.foreach_set("loop_start", np.arange(0, quads.size, 4, dtype=np.int32))
     mesh.update(calc_edges=True)
+    mesh.shade_flat()  # meshes that are made this way are smooth, and boxes would be shaded as balls
     mesh.materials.append(material)
     scene.collection.objects.link(bpy.data.objects.new(name, mesh))
 
