@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rooms of the benchmarks: the Cornell room is the one that accuracy is tested in; the hall is closed and has as many
-triangles as asked for."""
+"""The rooms of the benchmarks: the Cornell room is the one that accuracy is tested in; the hall is closed and has as
+many triangles as asked for."""
 
 import numpy as np
 import pytest
