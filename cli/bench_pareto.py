@@ -47,6 +47,7 @@ CYCLES_SETTINGS = (
 )
 THREE_SETTINGS = tuple({"bounces": bounces, "cubemapSize": size} for bounces, size in ((0, 8), (1, 8), (5, 8), (5, 16)))
 EEVEE_SAMPLES = (64, 256, 2048)
+_CHEAP_SETTINGS = 5  # of Cycles: those that may win
 _OUR_SHARE = 0.45  # of a scene's time: the dearest of our settings are left out before peers are
 _OURS, _CYCLES, _EEVEE, _THREE = "Gridlight", "Cycles panoramas", "EEVEE volume", "three.js"
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast")  # renderers beside which Chromium's software is the fair one
@@ -70,7 +71,7 @@ def measure(run: Run) -> dict:
 
 
 def _scene(run: Run, name: str) -> dict:
-    """One scene: ours, the reference, then peers from cheap to dear."""
+    """One scene: ours, the reference, then one measurement of every peer before the dear ones."""
     peers = Peers(run)
     facts, nodes = _ours(run, name, peers)
     part = {
@@ -85,16 +86,13 @@ def _scene(run: Run, name: str) -> dict:
     }
     if not peers.rows or not nodes:
         return part
-    bands = run.settings.bands
-    part["reference"] = peers.errors(name, nodes, run.args.error_spp, bands)
-    for panorama in CYCLES_SETTINGS:
-        request = cycles_request(name, panorama, run.args.panoramas, nodes, bands)
-        peers.measure(request, _CYCLES, panorama_name(panorama))
-    for samples in () if run.args.no_eevee else EEVEE_SAMPLES:
-        request = {"peer": "eevee", "scene": name, "samples": samples, "nodes": nodes}
-        peers.measure(request, _EEVEE, f"{samples} samples")
+    part["reference"] = peers.errors(name, nodes, run.args.error_spp, run.settings.bands)
+    _cycles(run, name, nodes, peers, CYCLES_SETTINGS[:_CHEAP_SETTINGS])
     if not run.args.no_three:
         part["three"] = _three(run, name, nodes, facts["device"], peers)
+    _eevee(run, name, nodes, peers, EEVEE_SAMPLES[:1])
+    _cycles(run, name, nodes, peers, CYCLES_SETTINGS[_CHEAP_SETTINGS:])
+    _eevee(run, name, nodes, peers, EEVEE_SAMPLES[1:])
     peers.relate(facts["scene"]["locations"], peers.rows[0]["seconds"])
     part["best"] = best(peers.rows, part["reference"])
     return part
@@ -133,6 +131,18 @@ def _ours(run: Run, name: str, peers: Peers) -> tuple[dict, list]:
         if waiting:
             peers.add(_OURS, setting_name(waiting.pop(0)), not_measured(merged["problem"]), None)
     return facts, nodes if isinstance(nodes, list) else []
+
+
+def _cycles(run: Run, name: str, nodes: list, peers: Peers, panoramas) -> None:
+    for panorama in panoramas:
+        request = cycles_request(name, panorama, run.args.panoramas, nodes, run.settings.bands)
+        peers.measure(request, _CYCLES, panorama_name(panorama))
+
+
+def _eevee(run: Run, name: str, nodes: list, peers: Peers, sample_counts) -> None:
+    for samples in () if run.args.no_eevee else sample_counts:
+        request = {"peer": "eevee", "scene": name, "samples": samples, "nodes": nodes}
+        peers.measure(request, _EEVEE, f"{samples} samples")
 
 
 def _three(run: Run, name: str, nodes: list, device: str, peers: Peers) -> dict | None:
