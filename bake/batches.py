@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core.steps import Pace, Steps
 from ..gpu_shaders.backend import GpuBackend, Surfaces
 from ..gpu_shaders.change_pass import move_layers
 from .stopwatch import Stopwatch
@@ -13,11 +14,12 @@ from .stopwatch import Stopwatch
 class Batches:
     """Slots 0 .. S−1 of the backend in order, cut into batches. ``captures`` counts probes captured so far."""
 
-    def __init__(self, backend: GpuBackend, nodes: np.ndarray, method: str, stopwatch: Stopwatch):
+    def __init__(self, backend: GpuBackend, nodes: np.ndarray, method: str, stopwatch: Stopwatch, pace: Pace):
         """``nodes`` (S,) grid indices of the slots; ``method`` "raster" or "trace"."""
         self._backend = backend
         self._method = method
         self.stopwatch = stopwatch
+        self.pace = pace
         self.captures = 0
         self._cut(nodes)
 
@@ -40,27 +42,26 @@ class Batches:
         first, count = self.range(index)
         return slots[(slots >= first) & (slots < first + count)]
 
-    def captured(self, index: int) -> Surfaces:
-        """Batch ``index`` with geometry, albedo and emission."""
+    def captured(self, index: int) -> Steps[Surfaces]:
+        """Batch ``index`` with geometry, albedo and emission; in steps where it must be captured first."""
         if index not in self._kept:
             if not self.resident:
                 self.drop()  # frees the images of the batch before
-            with self.stopwatch("capture"):
-                surfaces = self._kept[index] = self._backend.surfaces(*self.range(index))
-                self._capture(surfaces, 0, surfaces.count)
+            surfaces = self._backend.surfaces(*self.range(index))
+            yield from self.stopwatch.steps("capture", self._capture(surfaces, 0, surfaces.count))
+            self._kept[index] = surfaces
         return self._kept[index]
 
-    def bound(self, index: int) -> Surfaces:
+    def bound(self, index: int) -> Steps[Surfaces]:
         """The same with the patches that texels lie on."""
-        surfaces = self.captured(index)
+        surfaces = yield from self.captured(index)
         if index not in self._bound:
-            with self.stopwatch("light"):
-                self._backend.bind(surfaces)
+            yield from self.stopwatch.steps("light", self._backend.bind(surfaces))
             self._bound.add(index)
         return surfaces
 
-    def capture_again(self, slots: np.ndarray) -> None:
-        """Captures probes ``slots`` (L,), ascending, anew: they moved or see something else."""
+    def capture_again(self, slots: np.ndarray) -> Steps[None]:
+        """Captures probes ``slots`` (L,), ascending, anew, in steps: they moved or see something else."""
         for index in range(self.count):
             mine = self.slots_of(index, slots)
             if index not in self._kept or not len(mine):
@@ -68,14 +69,16 @@ class Batches:
             surfaces = self._kept[index]
             layers = mine - surfaces.first
             for run in np.split(layers, np.flatnonzero(np.diff(layers) > 1) + 1):
-                with self.stopwatch("capture"):
-                    self._capture(surfaces, int(run[0]), len(run))
+                start, count = int(run[0]), len(run)
+                yield from self.stopwatch.steps("capture", self._capture(surfaces, start, count))
                 if index in self._bound:
-                    with self.stopwatch("light"):
-                        self._backend.bind(surfaces, int(run[0]), len(run))
+                    yield from self.stopwatch.steps("light", self._backend.bind(surfaces, start, count))
 
-    def _capture(self, surfaces: Surfaces, start: int, count: int) -> None:
-        self._backend.capture(surfaces, self._method, start, count)
+    def _capture(self, surfaces: Surfaces, start: int, count: int) -> Steps[None]:
+        def capture(first: int, number: int) -> None:
+            self._backend.capture(surfaces, self._method, start + first, number)
+
+        yield from self.pace.portions("capture", count, capture)
         self.captures += count
 
     def unbind(self) -> None:

@@ -4,7 +4,7 @@ out, those that stay inside a solid are invalid."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,9 @@ from ..core import clearance, relocation
 from ..core.conventions import INVALID
 from ..core.grid import Grid
 from ..core.orientation import ShellVote, inside_solid
+from ..core.steps import Steps
 from ..gpu_shaders.backend import GpuBackend
+from ..gpu_shaders.probe_views import exits, sightings
 from .batches import Batches
 
 
@@ -68,32 +70,43 @@ class Placement:
 
 
 def place(
-    placement: Placement, batches: Batches, backend: GpuBackend, grid: Grid, obstacles: np.ndarray
-) -> Iterator[None]:
-    """Fills ``placement`` from texel surfaces captured at home and bound to patches: lights those and judges."""
-    with batches.stopwatch("light"):
-        backend.light.light_new_patches()
+    placement: Placement, batches: Batches, backend: GpuBackend, grid: Grid, obstacles: Callable[[], np.ndarray]
+) -> Steps[None]:
+    """Fills ``placement`` from texel surfaces captured at home and bound to patches: lights those and judges.
+
+    ``obstacles()`` (T, 3, 3): what to keep clear of.
+    """
+    yield from batches.stopwatch.steps("light", backend.light.light_new_patches())
     yield from judge(placement, batches, backend)
     placement.misplaced = relocation.misplaced(placement.shares) & ~placement.by_hand
     yield from _relocate(placement, batches, backend, grid, obstacles)
 
 
-def judge(placement: Placement, batches: Batches, backend: GpuBackend) -> Iterator[None]:
+def judge(placement: Placement, batches: Batches, backend: GpuBackend) -> Steps[None]:
     """What probes see as a whole, by the direct light of their patches."""
     vote = ShellVote(backend.object_count)
     for index in range(batches.count):
-        vote.add(backend.sightings(batches.bound(index)))
+        surfaces = yield from batches.bound(index)
+        vote.add(sightings(backend, surfaces))
         yield
     backend.set_shells(vote.shells())
     for index in range(batches.count):
-        backend.statistics(batches.bound(index))
-        yield
+        yield from _statistics(batches, index, backend)
     placement.shares = backend.read_shares()
 
 
+def _statistics(batches: Batches, index: int, backend: GpuBackend) -> Steps[None]:
+    surfaces = yield from batches.bound(index)
+
+    def statistics(start: int, number: int) -> None:
+        backend.statistics(surfaces, start, number)
+
+    yield from batches.pace.portions("statistics", surfaces.count, statistics)
+
+
 def _relocate(
-    placement: Placement, batches: Batches, backend: GpuBackend, grid: Grid, obstacles: np.ndarray
-) -> Iterator[None]:
+    placement: Placement, batches: Batches, backend: GpuBackend, grid: Grid, obstacles: Callable[[], np.ndarray]
+) -> Steps[None]:
     """Moves probes that stand in or behind walls. One that sees no light from its new place either goes back. Where
     they came out, and in rooms with their normals outwards, they keep clear of surfaces too."""
     candidates = np.flatnonzero(placement.misplaced)
@@ -101,14 +114,17 @@ def _relocate(
     for index in range(batches.count):
         slots = batches.slots_of(index, candidates)
         if len(slots):
-            surfaces = batches.bound(index)
-            step[slots] = relocation.moves(grid, placement.home[slots], backend.exits(surfaces, slots - surfaces.first))
+            surfaces = yield from batches.bound(index)
+            found = exits(backend, surfaces, slots - surfaces.first)
+            step[slots] = relocation.moves(grid, placement.home[slots], found)
         yield
     settled = (~placement.misplaced | placement.moved) & ~placement.by_hand
-    clear = clearance.keep_clear(
-        grid, placement.nodes[settled], (placement.home + step)[settled], obstacles, also_behind=True
-    )
-    step[settled] = clear - placement.home[settled]
+
+    def keep_clear() -> np.ndarray:
+        at = (placement.home + step)[settled]
+        return clearance.keep_clear(grid, placement.nodes[settled], at, obstacles(), also_behind=True)
+
+    step[settled] = (yield from batches.pace.in_background(keep_clear)) - placement.home[settled]
     moved = np.flatnonzero(placement.moved)
     if not len(moved):
         return
@@ -119,17 +135,14 @@ def _relocate(
     yield from _stand(placement, back, batches, backend)
 
 
-def _stand(placement: Placement, changed: np.ndarray, batches: Batches, backend: GpuBackend) -> Iterator[None]:
+def _stand(placement: Placement, changed: np.ndarray, batches: Batches, backend: GpuBackend) -> Steps[None]:
     """Captures and judges probes ``changed`` (L,) where they stand now."""
     backend.set_probes(placement.nodes, placement.home + placement.step)
-    batches.capture_again(changed)
-    yield
-    with batches.stopwatch("light"):
-        backend.light.light_new_patches()
+    yield from batches.capture_again(changed)
+    yield from batches.stopwatch.steps("light", backend.light.light_new_patches())
     for index in range(batches.count):
         if len(batches.slots_of(index, changed)):
-            backend.statistics(batches.bound(index))
-        yield
+            yield from _statistics(batches, index, backend)
     placement.shares = backend.read_shares()
 
 

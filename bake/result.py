@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from dataclasses import field as default
 from typing import Protocol
 
+from ..core.errors import InputError
 from ..core.field import Field
+from ..core.snapshot import SceneSnapshot
 from ..gpu_shaders.scene_textures import SceneTextures
 
 
@@ -51,6 +53,7 @@ class Relit:
     lights_direct: int = 0  # lamps whose direct light was computed
     patches_traced: int = 0  # whose rays to others were traced
     hierarchy: str = "kept"  # kept | refit | rebuilt
+    kept_places: bool = True  # probes and patches are where they were: only their light is new
     warm_start: bool = False  # bounces went on from the light before
     iterations: int = 0
 
@@ -72,3 +75,16 @@ class BakeResult:
     notes: list[str] = default(default_factory=list)
     warnings: list[str] = default(default_factory=list)
     relit: Relit | None = None
+
+
+def check_scene(snapshot: SceneSnapshot, result: BakeResult) -> None:
+    """Refuses scenes without surface, warns of those without light."""
+    if not len(snapshot.triangles):
+        raise InputError(f"scene '{snapshot.name}' has no surface that renders; add or unhide a mesh")
+    emits = any(any(m.emission) for m in snapshot.materials)
+    world = snapshot.world.map is not None or any(snapshot.world.color)
+    if not (snapshot.lights or emits or world):
+        result.warnings.append(
+            f"scene '{snapshot.name}' has no light: no lamp, emission or world; the field is black. Add a light or "
+            "enable its rendering"
+        )

@@ -13,7 +13,6 @@ where they are when only light changes. Steps are generators that yield between 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -28,14 +27,15 @@ from ..core.probe_edits import ProbeEdits
 from ..core.scene_changes import SceneChanges, ShapeChange, compare
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
+from ..core.steps import Pace, Steps
 from ..gpu_shaders.backend import GpuBackend
-from ..gpu_shaders.change_pass import probes_reached, resolve_again
+from ..gpu_shaders.change_pass import new_numbers, probes_reached, resolve_again
 from .batches import Batches
 from .capture_choice import choose_capture
 from .convergence import MANY_MODES, Convergence
 from .deringing import dering_field
 from .placement import Placement, judge, place
-from .result import BakeResult, Relit, Reporter
+from .result import BakeResult, Relit, Reporter, check_scene
 from .stopwatch import Stopwatch
 
 _SMALL_CHANGE = 0.5  # of the light that bounces begin with: above, the light before is no better start than the dark
@@ -58,7 +58,9 @@ class BakeSession:
         edits: ProbeEdits | None = None,
         result: BakeResult | None = None,
         stopwatch: Stopwatch | None = None,
+        pace: Pace | None = None,
     ):
+        """``pace``: how much is done in a step; without one steps are as large as they come."""
         self.snapshot = snapshot
         self.grid = grid
         self.settings = settings
@@ -67,39 +69,43 @@ class BakeSession:
         self._edits = edits or ProbeEdits.none(grid)
         self._stopwatch = stopwatch or Stopwatch({})
         self._stopwatch.seconds = self.result.seconds
+        self._pace = pace or Pace(None)
+        self.unshown = np.zeros(0, bool)  # (S,): probes whose light has changed since ``show`` was there
 
     # The bake
     # ------------------------------------------------------------------------------------------------------------------
 
-    def bake(self) -> Iterator[None]:
+    def bake(self) -> Steps[None]:
         """The whole bake in steps; fills ``result`` as it goes and completes it with the last step.
 
         Raises:
             InputError: the scene has no surface, or the grid does not fit the GPU.
         """
         result = self.result
-        _check(self.snapshot, result)
-        with self._stopwatch("cull"):
-            self._reporter.phase("cull")
-            self._state = self._cull()
+        check_scene(self.snapshot, result)
+        self._reporter.phase("cull")
+        self._state = yield from self._stopwatch.steps("cull", self._pace.in_background(self._cull))
         yield
-        with self._stopwatch("setup"):
-            self._reporter.phase("upload")
-            self.backend = GpuBackend(self.snapshot, self.grid, self.settings)
+        self._reporter.phase("upload")
+        making = GpuBackend.make(self.snapshot, self.grid, self.settings, self._pace)
+        self.backend = yield from self._stopwatch.steps("setup", making)
         yield
         result.scene = self.backend.scene
         result.capture, reason = choose_capture(
             self.settings, self.backend.scene.triangle_count, int((self._state == ACTIVE).sum())
         )
         result.notes.append(reason)
-        self._batches = Batches(self.backend, np.flatnonzero(self._state == ACTIVE), result.capture, self._stopwatch)
+        nodes = np.flatnonzero(self._state == ACTIVE)
+        self._batches = Batches(self.backend, nodes, result.capture, self._stopwatch, self._pace)
         if not self._batches.resident:
             result.notes.append(
                 f"texel surfaces of {len(self._batches.nodes)} probes exceed the memory budget of "
                 f"{self.settings.memory_mib} MiB: they are captured again whenever they are needed"
             )
-        self._stand_at_home()
+        yield from self._stand_at_home()
         yield from self._light_from_texels()
+        yield from self.show()
+        yield from self.finish()
 
     def _cull(self) -> np.ndarray:
         """(P,) uint8 states before capture: ACTIVE or CULLED."""
@@ -116,33 +122,37 @@ class BakeSession:
     def _obstacles(self) -> np.ndarray:
         return clearance.obstacles(self.grid, self.snapshot)
 
-    def _stand_at_home(self) -> None:
+    def _stand_at_home(self) -> Steps[None]:
         """Puts the probes of all slots where they belong, with no light yet."""
-        self._placement = Placement.at_home(self.grid, self._batches.nodes, self._edits.offset, self._obstacles())
+        nodes = self._batches.nodes
+
+        def at_home() -> Placement:
+            return Placement.at_home(self.grid, nodes, self._edits.offset, self._obstacles())
+
+        self._placement = yield from self._stopwatch.steps("cull", self._pace.in_background(at_home))
         self.backend.set_probes(self._batches.nodes, self._placement.home)
         self.backend.allocate_field()
 
-    def _light_from_texels(self) -> Iterator[None]:
-        """Everything after capture, from nothing: patches, placement, bounces, field."""
+    def _light_from_texels(self) -> Steps[None]:
+        """Everything after capture, from nothing: patches, placement, bounces."""
         result, batches = self.result, self._batches
         self._reporter.phase("capture", len(batches.nodes))
         for index in range(batches.count):
-            self._reporter.advance(batches.bound(index).count)
+            surfaces = yield from batches.bound(index)
+            self._reporter.advance(surfaces.count)
             yield
-        yield from place(self._placement, batches, self.backend, self.grid, self._obstacles())
+        yield from place(self._placement, batches, self.backend, self.grid, self._obstacles)
         moved = int(self._placement.moved.sum())
         if moved:
             result.notes.append(f"{moved} probes in or behind walls were moved out, at most half a cell")
         self._reporter.phase("light")
-        with self._stopwatch("light"):
-            self.backend.light.connect()
+        yield from self._stopwatch.steps("light", self.backend.light.connect())
         result.notes.append(f"light bounces between {self.backend.light.count} patches of surface")
         yield
         yield from self._bounce(warm=False)
-        yield from self._show(emission=self.backend.scene.emitter_count > 0)
-        self._finish()
+        self._mark_unshown(emission=self.backend.scene.emitter_count > 0)
 
-    def _bounce(self, warm: bool) -> Iterator[None]:
+    def _bounce(self, warm: bool) -> Steps[None]:
         """Iterates until the light has settled, from the dark or from the light before."""
         convergence = Convergence(self.settings.bounces, self.settings.tolerance)
         while not convergence.done:
@@ -163,23 +173,40 @@ class BakeSession:
         self.result.change = convergence.changes
         self.result.notes.append(convergence.reason)
 
-    def _show(self, emission: bool) -> Iterator[None]:
-        """The field of all probes by the light of patches, or by a gather; with ``emission``, also what they see of
-        sampled emitters."""
-        batches, backend = self._batches, self.backend
-        for index in range(batches.count) if emission else ():
-            with self._stopwatch("light"):
-                backend.find_emission(batches.bound(index))
-            yield
-        self._reporter.phase("gather" if self.settings.gather else "project", len(batches.nodes))
-        for index in range(batches.count):
-            surfaces = batches.bound(index)
-            with self._stopwatch("light"):
-                (backend.gather if self.settings.gather else backend.project)(surfaces)
-                self._reporter.advance(surfaces.count)
-            yield
+    def _mark_unshown(self, emission: bool) -> None:
+        """The light of all probes has changed; with ``emission``, also what they see of sampled emitters."""
+        self.unshown = np.ones(len(self._batches.nodes), bool)
+        self._emission_unknown = np.full(len(self._batches.nodes), emission)
 
-    def _finish(self) -> None:
+    @property
+    def positions(self) -> np.ndarray:
+        """(S, 3) world metres: where probes capture."""
+        return self._placement.home + self._placement.step
+
+    def show(self, slots: np.ndarray | None = None) -> Steps[None]:
+        """The field of the probes in ``slots`` (L,), or of all, by the light of patches, or by a gather."""
+        batches, backend, kind = self._batches, self.backend, "gather" if self.settings.gather else "project"
+        slots = np.arange(len(batches.nodes)) if slots is None else slots
+        self._reporter.phase(kind, len(slots))
+        for index in range(batches.count):
+            mine = batches.slots_of(index, slots)
+            if not len(mine):
+                continue
+            surfaces = yield from batches.bound(index)
+
+            def project(start: int, number: int, mine=mine, surfaces=surfaces) -> None:
+                some = mine[start : start + number]
+                blind = some[self._emission_unknown[some]]
+                if len(blind):
+                    backend.find_emission(surfaces, blind - surfaces.first)
+                    self._emission_unknown[blind] = False
+                (backend.gather if self.settings.gather else backend.project)(surfaces, some - surfaces.first)
+                self.unshown[some] = False
+                self._reporter.advance(number)
+
+            yield from self._stopwatch.steps("light", self._pace.portions(kind, len(mine), project))
+
+    def finish(self) -> Steps[None]:
         """Reads the field back and completes it for probes without light of their own."""
         result, placement, backend = self.result, self._placement, self.backend
         state, all_inside = placement.states(self._state)
@@ -196,13 +223,11 @@ class BakeSession:
             field.offset[:] = self._edits.offset
             field.offset[nodes] = placement.home + placement.step - self.grid.positions()[nodes]
             field.coefficients[nodes] = backend.read_field()
-            field.coefficients = dilation.fill(self.grid, field.coefficients, state == ACTIVE)
             field.depth[nodes] = backend.read_depth()
             field.gradient[nodes] = backend.read_gradient()
-            field.gradient[state != ACTIVE] = 0.0
-            field.gradient = gradients.limited(self.grid, field.gradient, field.coefficients)
-            if self.settings.deringing:
-                result.notes.append(dering_field(field))
+        yield
+        notes = yield from self._stopwatch.steps("light", self._pace.in_background(self._complete, field))
+        result.notes += notes
         result.counts = {"total": self.grid.count} | {
             name: int((state == value).sum())
             for name, value in (("active", ACTIVE), ("culled", CULLED), ("invalid", INVALID))
@@ -212,17 +237,29 @@ class BakeSession:
                 f"scene '{self.snapshot.name}' sends light that is not finite; look for lights or emission beyond 1e30"
             )
 
+    def _complete(self, field: Field) -> list[str]:
+        """Light of nodes that have none of their own, and limits; returns what to say about it."""
+        active = field.state == ACTIVE
+        field.coefficients = dilation.fill(self.grid, field.coefficients, active)
+        field.gradient[~active] = 0.0
+        field.gradient = gradients.limited(self.grid, field.gradient, field.coefficients)
+        return [dering_field(field)] if self.settings.deringing else []
+
     # Relighting
     # ------------------------------------------------------------------------------------------------------------------
 
-    def relight(self, snapshot: SceneSnapshot) -> Iterator[None]:
+    def relight(self, snapshot: SceneSnapshot, live: bool = False) -> Steps[None]:
         """Brings the bake to ``snapshot``, another state of the scene, in steps; ``result`` is a new one, with
         ``relit``. If the steps are not followed to their end the session must not be used any more.
+
+        ``live``: light is left with the patches. What is ``unshown`` is then up to ``show``, in any order, and there is
+        no field before ``finish``; another relight may come in between. Probes stay where they are while only light
+        changes, even where a fresh bake would move some or find them in a solid.
 
         Raises:
             InputError: as ``bake`` does.
         """
-        changes = compare(self.snapshot, snapshot)
+        changes = yield from self._pace.in_background(compare, self.snapshot, snapshot)
         last = self.result
         relit = Relit(changes.describe(), len(self._batches.nodes), patches=self.backend.light.count)
         if changes.nothing:
@@ -230,7 +267,7 @@ class BakeSession:
             return
         self.result = BakeResult(scene=self.backend.scene, capture=last.capture, relit=relit)
         self._stopwatch.seconds = self.result.seconds
-        _check(snapshot, self.result)
+        check_scene(snapshot, self.result)
         self._lamps_before = len(self.snapshot.lights)
         self.snapshot = snapshot
         captures = self._batches.captures
@@ -240,47 +277,50 @@ class BakeSession:
             self._reporter.phase("upload")
             relit.hierarchy = self.backend.update(snapshot, changes)
         yield
+        self._reporter.phase("light")
         if changes.shape:
             yield from self._reshape(changes.shape, relit.hierarchy, order, had_emitters)
         rebind = bool(changes.shape)
         if changes.world or changes.emission or changes.reflectance:
             rebind |= yield from self._resolve()
         if not rebind:
-            rebind = not (yield from self._light_again(changes, had_emitters))
+            rebind = not (yield from self._light_again(changes, had_emitters, live))
         if rebind:
             yield from self._light_anew()
+        relit.kept_places = not rebind
+        if not live:
+            yield from self.show()
+            yield from self.finish()
         relit.probes, relit.patches = len(self._batches.nodes), self.backend.light.count
         relit.probes_captured = self._batches.captures - captures
         relit.iterations = self.result.iterations
 
-    def _light_again(self, changes: SceneChanges, had_emitters: bool) -> Iterator[None]:
+    def _light_again(self, changes: SceneChanges, had_emitters: bool, live: bool) -> Steps[bool]:
         """Light for patches that stay; returns whether they could."""
         light, relit = self.backend.light, self.result.relit
         before = light.source
         emitters = changes.emission and (had_emitters or self.backend.scene.emitter_count > 0)
         lamps = self._changed_lamps(changes)
         if lamps.any() or changes.lights_removed or changes.world or emitters:
-            with self._stopwatch("light"):
-                relit.lights_direct = light.light_again(lamps, emitters)
+            relit.lights_direct = yield from self._stopwatch.steps("light", light.light_again(lamps, emitters))
             relit.patches_lit = light.count if relit.lights_direct or emitters else 0
             yield
         if changes.world or changes.emission or changes.reflectance:
-            with self._stopwatch("light"):
-                if not light.carry_again():
-                    return False
+            if not (yield from self._stopwatch.steps("light", light.carry_again())):
+                return False
             relit.patches_traced = light.count
             yield
-        yield from judge(self._placement, self._batches, self.backend)
-        if self._placement.is_outdated:
-            return False
+        if not live:
+            yield from judge(self._placement, self._batches, self.backend)
+            if self._placement.is_outdated:
+                return False
         after = light.source
         small = np.square(after - before).sum() < _SMALL_CHANGE**2 * np.square(after).sum()
         relit.warm_start = bool(self.settings.bounces is None and small)
         yield from self._bounce(relit.warm_start)
         if emitters:
             self.backend.forget_emission()
-        yield from self._show(emitters and self.backend.scene.emitter_count > 0)
-        self._finish()
+        self._mark_unshown(emission=emitters and self.backend.scene.emitter_count > 0)
         return True
 
     def _changed_lamps(self, changes: SceneChanges) -> np.ndarray:
@@ -289,52 +329,52 @@ class BakeSession:
         moved_up = changes.lights_removed > 0 or len(changes.lights) > self._lamps_before
         return np.concatenate([changes.lights, np.full(suns, changes.world or moved_up)])
 
-    def _light_anew(self) -> Iterator[None]:
+    def _light_anew(self) -> Steps[None]:
         """Light from texel surfaces on; probes that had been moved capture at home first, where placement begins."""
         relit = self.result.relit
         moved = np.flatnonzero(self._placement.moved)
-        self._stand_at_home()
+        yield from self._stand_at_home()
         self._batches.unbind()
-        self._batches.capture_again(moved)
+        yield from self._batches.capture_again(moved)
         self.backend.forget_patches()
         yield
         yield from self._light_from_texels()
         relit.patches_lit = relit.patches_traced = self.backend.light.count
         relit.lights_direct = self.backend.scene.lamp_count
 
-    def _resolve(self) -> Iterator[None]:
+    def _resolve(self) -> Steps[bool]:
         """Materials of texels anew; returns whether patches must be found anew."""
         batches, rebind = self._batches, False
         if not batches.resident:
             batches.drop()
             return True
         for index in range(batches.count):
+            surfaces = yield from batches.captured(index)
             with self._stopwatch("capture"):
-                rebind |= resolve_again(self.backend, batches.captured(index))
+                rebind |= resolve_again(self.backend, surfaces)
             yield
         return rebind
 
-    def _reshape(self, shape: ShapeChange, hierarchy: str, old_order: np.ndarray, had_emitters: bool) -> Iterator[None]:
+    def _reshape(self, shape: ShapeChange, hierarchy: str, old_order: np.ndarray, had_emitters: bool) -> Steps[None]:
         """Texel surfaces for triangles that changed: captured where the change can be seen, kept elsewhere."""
         backend, batches, placement = self.backend, self._batches, self._placement
-        with self._stopwatch("cull"):
-            self._state = self._cull()
+        self._state = yield from self._stopwatch.steps("cull", self._pace.in_background(self._cull))
         again = placement.moved
         for index in range(batches.count) if batches.resident else ():
+            surfaces = yield from batches.captured(index)
             with self._stopwatch("capture"):
-                surfaces = batches.captured(index)
                 mine = slice(surfaces.first, surfaces.first + surfaces.count)
                 again[mine] |= self._reached(surfaces, shape)
                 if hierarchy == "rebuilt" or had_emitters or backend.scene.emitter_count:
-                    numbers = _new_numbers(shape, old_order, backend.scene.hierarchy.order)
+                    numbers = new_numbers(shape, old_order, backend.scene.hierarchy.order)
                     resolve_again(backend, surfaces, numbers if hierarchy == "rebuilt" else None)
             yield
         again = np.isin(np.flatnonzero(self._state == ACTIVE), placement.nodes[again])
         with self._stopwatch("capture"):
             missing = batches.regroup(np.flatnonzero(self._state == ACTIVE))
             again[missing] = True
-            self._stand_at_home()
-        batches.capture_again(np.flatnonzero(again))
+        yield from self._stand_at_home()
+        yield from batches.capture_again(np.flatnonzero(again))
         yield
 
     def _reached(self, surfaces, shape: ShapeChange) -> np.ndarray:
@@ -343,26 +383,3 @@ class BakeSession:
         positions = self._placement.home + self._placement.step - self.grid.center
         old, new = (grown(boxes - self.grid.center, positions, spread) for boxes in (shape.old_boxes, shape.new_boxes))
         return probes_reached(self.backend, surfaces, old, new)
-
-
-def _new_numbers(shape: ShapeChange, old_order: np.ndarray, new_order: np.ndarray) -> np.ndarray:
-    """(T,) number in the new leaf order of each triangle of the old one, −1 for those that are gone."""
-    before = np.arange(len(new_order)) if shape.triangle_map is None else shape.triangle_map
-    now = np.full(len(old_order), -1)
-    now[before[before >= 0]] = np.flatnonzero(before >= 0)
-    place = np.empty(len(new_order), int)
-    place[new_order] = np.arange(len(new_order))
-    return np.where(now[old_order] >= 0, place[now[old_order]], -1)
-
-
-def _check(snapshot: SceneSnapshot, result: BakeResult) -> None:
-    """Refuses scenes without surface, warns of those without light."""
-    if not len(snapshot.triangles):
-        raise InputError(f"scene '{snapshot.name}' has no surface that renders; add or unhide a mesh")
-    emits = any(any(m.emission) for m in snapshot.materials)
-    world = snapshot.world.map is not None or any(snapshot.world.color)
-    if not (snapshot.lights or emits or world):
-        result.warnings.append(
-            f"scene '{snapshot.name}' has no light: no lamp, emission or world; the field is black. Add a light or "
-            "enable its rendering"
-        )

@@ -7,6 +7,8 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from ..core.steps import Result, Steps
+
 
 class Stopwatch:
     """Adds the time of steps to their phase. GPU work is counted where the program waits for it."""
@@ -20,3 +22,13 @@ class Stopwatch:
         start = time.perf_counter()
         yield
         self.seconds[phase] = self.seconds.get(phase, 0.0) + time.perf_counter() - start
+
+    def steps(self, phase: str, steps: Steps[Result]) -> Steps[Result]:
+        """Follows ``steps`` and adds their time, but not what passes between them."""
+        while True:
+            with self(phase):
+                try:
+                    next(steps)
+                except StopIteration as end:
+                    return end.value
+            yield

@@ -21,19 +21,19 @@ def fill(grid: Grid, coefficients: np.ndarray, active: np.ndarray) -> np.ndarray
     filled = coefficients.astype(np.float64)
     missing = np.flatnonzero(~active)
     known = active.copy()
-    neighbours = _neighbours(grid, missing)
+    around = neighbours(grid, missing)
     while not known.all():  # first guess: layer by layer from what is known
-        weights = _usable(neighbours, known)
+        weights = _usable(around, known)
         ready = weights.any(axis=1) & ~known[missing]
-        filled[missing[ready]] = _mean(filled, neighbours[ready], weights[ready])
+        filled[missing[ready]] = _mean(filled, around[ready], weights[ready])
         known[missing[ready]] = True
-    weights = neighbours >= 0
+    weights = around >= 0
     for _ in range(_SWEEPS):
-        filled[missing] = _mean(filled, neighbours, weights)
+        filled[missing] = _mean(filled, around, weights)
     return filled.astype(coefficients.dtype)
 
 
-def _neighbours(grid: Grid, nodes: np.ndarray) -> np.ndarray:
+def neighbours(grid: Grid, nodes: np.ndarray) -> np.ndarray:
     """(N, 6) flat indices of the nodes one step along each axis, −1 past the edge."""
     resolution = np.array(grid.resolution)
     strides = np.array([1, resolution[0], resolution[0] * resolution[1]])

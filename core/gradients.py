@@ -26,7 +26,7 @@ from .grid import Grid
 LEAST_COSINE = 0.05  # at emitters: light that leaves them flatter changes faster than a probe's cell can use
 _MOST_BANDS = 3  # the cosine lobe has no more
 _NEAREST = 0.5  # of the shortest cell edge
-_MOST_CHANGE = 2.0  # of band 0, over one cell along each axis together
+MOST_CHANGE = 2.0  # of band 0, over one cell along each axis together
 
 
 def gradient_bands(bands: int) -> int:
@@ -118,9 +118,13 @@ def point_gradient(
 def per_cell(grid: Grid, gradient: np.ndarray) -> np.ndarray:
     """(P, 3, K, 3) change over one cell along each of the grid's axes, from ``gradient`` (P, 3, K, 3) per metre along
     the world's; 0 along axes with one node, where there is no cell to cross."""
+    return np.einsum("ia,pikc->pakc", cell_axes(grid), np.asarray(gradient, float))
+
+
+def cell_axes(grid: Grid) -> np.ndarray:
+    """(3, 3) metres: columns are one cell along each of the grid's axes, 0 along axes with one node."""
     steps = np.array(grid.resolution) - 1
-    cells = np.where(steps > 0, 2.0 * grid.matrix[:3, :3] / np.maximum(steps, 1), 0.0)
-    return np.einsum("ia,pikc->pakc", cells, np.asarray(gradient, float))
+    return np.where(steps > 0, 2.0 * grid.matrix[:3, :3] / np.maximum(steps, 1), 0.0)
 
 
 def limited(grid: Grid, gradient: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
@@ -128,6 +132,6 @@ def limited(grid: Grid, gradient: np.ndarray, coefficients: np.ndarray) -> np.nd
     than itself: a lookup goes half of the gradient over a whole cell or all of it over half a cell along each axis, so
     what it reads of a probe cannot turn negative. By colour, all bands alike."""
     change = np.abs(per_cell(grid, gradient[:, :, :1])).sum(axis=1)[:, 0]
-    most = _MOST_CHANGE * np.abs(np.asarray(coefficients[:, 0], float))
+    most = MOST_CHANGE * np.abs(np.asarray(coefficients[:, 0], float))
     scale = np.where(change > most, most / np.where(change > 0, change, 1.0), 1.0)
     return (gradient * scale[:, None, None]).astype(gradient.dtype)

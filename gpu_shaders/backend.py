@@ -21,6 +21,7 @@ from ..core.patches import gather_rays
 from ..core.scene_changes import SceneChanges
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot, World
+from ..core.steps import Pace, Steps
 from ..core.world_map import world_texels
 from ..core.world_suns import extract_suns
 from .gradient_pass import GradientPass
@@ -28,7 +29,7 @@ from .patch_light import PatchLight
 from .programs import program
 from .raster_capture import RasterCapture
 from .scene_textures import SceneTextures
-from .textures import allocate, layers, read, upload
+from .textures import allocate, layers, numbers, read, upload
 
 _GROUP = 64  # threads that share a probe where its texels are summed
 # Kept images of texel surfaces. Albedo is 32 bit: in a bright room an error of 1e-4 in 0.99 is one of 1e-2 in the
@@ -64,12 +65,22 @@ class Surfaces:
 class GpuBackend:
     """Bakes one scene with one set of settings; the grid's active probes are given by ``set_probes``."""
 
-    def __init__(self, snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings):
+    def __init__(
+        self,
+        snapshot: SceneSnapshot,
+        grid: Grid,
+        settings: BakeSettings,
+        scene: SceneTextures | None = None,
+        pace: Pace | None = None,
+    ):
+        """``scene``: ``snapshot`` with the grid's centre as origin, made here where it is not given. ``pace``: of what
+        is done in steps."""
+        self._pace = pace or Pace(None)
         self.grid = grid
         self.settings = settings
         self.face = settings.face
         self.coefficients = settings.bands**2
-        self.scene = SceneTextures(snapshot, grid.center, sampling_density(snapshot, grid))
+        self.scene = scene or SceneTextures(snapshot, grid.center, sampling_density(snapshot, grid))
         self.object_count = max(len(snapshot.object_names), 1)
         self._shells = upload(np.zeros((self.object_count, 4)), "objects")
         weights = np.zeros((self.face * self.face, 4), np.float32)
@@ -89,6 +100,13 @@ class GpuBackend:
         self.probes_in_budget = max(1, budget // (texels * BYTES_PER_TEXEL))
         self._hits: _Hits | None = None
         self._raster: RasterCapture | None = None
+
+    @classmethod
+    def make(cls, snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, pace: Pace) -> Steps[GpuBackend]:
+        """The same in steps."""
+        density = yield from pace.in_background(sampling_density, snapshot, grid)
+        scene = yield from SceneTextures.make(snapshot, grid.center, density, pace)
+        return cls(snapshot, grid, settings, scene, pace)
 
     def _send_world(self, snapshot: SceneSnapshot) -> None:
         """Probes see the world whole; to patches its suns are lamps and rays see the rest."""
@@ -189,38 +207,14 @@ class GpuBackend:
         shader.uniform_int("first_layer", (first_layer,))
         self._dispatch_texels(shader, count)
 
-    def sightings(self, surfaces: Surfaces) -> np.ndarray:
-        """(count, 384): which objects each probe sees, see core/orientation.py. Needs direct light."""
-        shader = program("object_sightings_comp", FACE=self.face)
-        result = allocate(surfaces.count * 96, "sightings")
-        shader.uniform_sampler("patch_irradiance", self.light.direct)
-        self.scene.bind(shader, "triangle_attributes")
-        for name in ("geometry", "albedo", "emission"):
-            shader.uniform_sampler(name, surfaces.textures[name])
-        shader.image("sightings", result)
-        gpu.compute.dispatch(shader, surfaces.count, 1, 1)
-        return read(result, surfaces.count * 96).reshape(surfaces.count, -1)
-
     def set_shells(self, shells: np.ndarray) -> None:
         """Objects (object_count,) bool whose back faces do not tell the inside of a solid."""
         rows = np.zeros((self.object_count, 4), np.float32)
         rows[: len(shells), 0] = shells
         self._shells = upload(rows, "objects")
 
-    def exits(self, surfaces: Surfaces, layers_: np.ndarray) -> np.ndarray:
-        """(L, 6, 4) offset and distance of the nearest surface in each face, for the probes in ``layers_`` (L,)."""
-        shader = program("probe_exits_comp", FACE=self.face)
-        rows = np.zeros((len(layers_), 4), np.float32)
-        rows[:, 0] = layers_
-        slots, result = upload(rows, "probes"), allocate(len(layers_) * 6, "exits")
-        shader.uniform_sampler("slots", slots)
-        shader.uniform_sampler("geometry", surfaces.textures["geometry"])
-        shader.image("exits", result)
-        gpu.compute.dispatch(shader, len(layers_), 1, 1)
-        return read(result, len(layers_) * 6).reshape(-1, 6, 4)
-
-    def statistics(self, surfaces: Surfaces) -> None:
-        """Depth moments and what the probes see as a whole. Needs direct light."""
+    def statistics(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> None:
+        """Depth moments and what all or ``count`` probes from ``start`` see as a whole. Needs direct light."""
         shader = program("probe_statistics_comp", FACE=self.face)
         shader.uniform_sampler("texel_weights", self._texel_weights)
         shader.uniform_sampler("shells", self._shells)
@@ -230,10 +224,10 @@ class GpuBackend:
             shader.uniform_sampler(name, surfaces.textures[name])
         shader.image("depth_moments", self._moments)
         shader.image("probe_shares", self._shares)
-        shader.uniform_int("first_slot", (surfaces.first,))
-        shader.uniform_int("first_layer", (0,))
+        shader.uniform_int("first_slot", (surfaces.first + start,))
+        shader.uniform_int("first_layer", (start,))
         shader.uniform_float("depth_clamp", lookup.depth_clamp(self.grid))
-        gpu.compute.dispatch(shader, surfaces.count, 1, 1)
+        gpu.compute.dispatch(shader, surfaces.count if count is None else count, 1, 1)
 
     def read_shares(self) -> np.ndarray:
         """(slots, 4) float32 shares of the sphere: back faces of solids, background, lit, all back faces."""
@@ -249,16 +243,17 @@ class GpuBackend:
 
     def forget_patches(self) -> None:
         """Begins with no patch: all texels must be bound again."""
-        self.light = PatchLight(self.scene, self.grid, self.settings, self.world_rest)
+        self.light = PatchLight(self.scene, self.grid, self.settings, self.world_rest, self._pace)
 
-    def bind(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> None:
-        """Finds the patches on which the texels of all or of ``count`` probes from ``start`` lie."""
+    def bind(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> Steps[None]:
+        """Finds the patches on which the texels of all or of ``count`` probes from ``start`` lie, in steps."""
         first = surfaces.first + start
         stop = surfaces.first + surfaces.count if count is None else first + count
         while first < stop:
             end = min(stop, (first // self._portion + 1) * self._portion)
             self._bind_portion(surfaces, first - surfaces.first, end - first)
             first = end
+            yield
 
     def _bind_portion(self, surfaces: Surfaces, start: int, count: int) -> None:
         first = surfaces.first + start
@@ -284,23 +279,24 @@ class GpuBackend:
         self._dispatch_texels(shader, count)
         return hits
 
-    def project(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> None:
-        """The field of all or of ``count`` probes from ``start``: what their texels send by the light of their
-        patches."""
-        count = surfaces.count if count is None else count
-        self._project(surfaces, start, count, self.light.irradiance, own_texels=False)
+    def project(self, surfaces: Surfaces, layers_: np.ndarray) -> None:
+        """The field of the probes in ``layers_`` (L,): what their texels send by the light of their patches."""
+        self._project(surfaces, layers_, self.light.irradiance, own_texels=False)
 
-    def gather(self, surfaces: Surfaces) -> None:
-        """The field of these probes by a final gather: every texel with light and paths of its own."""
+    def gather(self, surfaces: Surfaces, layers_: np.ndarray) -> None:
+        """The field of the probes in ``layers_`` (L,) by a final gather: every texel with light and paths of its
+        own."""
         texels = 6 * self.face**2
         at_once = max(1, _GATHER_RAYS // (texels * gather_rays(self.settings.samples)))
-        for start in range(0, surfaces.count, at_once):
-            count = min(at_once, surfaces.count - start)
-            first_key = (surfaces.first + start) * texels
-            irradiance = self.light.gather(self._texel_hits(surfaces, start, count), count * texels, first_key)
-            self._project(surfaces, start, count, irradiance, own_texels=True)
+        for run in np.split(layers_, np.flatnonzero(np.diff(layers_) != 1) + 1):
+            for start in range(0, len(run), at_once):
+                some = run[start : start + at_once]
+                hits = self._texel_hits(surfaces, int(some[0]), len(some))
+                first_key = (surfaces.first + int(some[0])) * texels
+                irradiance = self.light.gather(hits, len(some) * texels, first_key)
+                self._project(surfaces, some, irradiance, own_texels=True)
 
-    def _project(self, surfaces: Surfaces, start: int, count: int, irradiance, own_texels: bool) -> None:
+    def _project(self, surfaces: Surfaces, layers_: np.ndarray, irradiance, own_texels: bool) -> None:
         shader = program(
             "field_project_comp",
             FACE=self.face,
@@ -308,26 +304,35 @@ class GpuBackend:
             COEFFICIENTS=self.coefficients,
             GROUP=_GROUP,
         )
+        listed = numbers(layers_, "probes")
+        shader.uniform_sampler("probe_layers", listed)
         shader.uniform_sampler("texel_weights", self._texel_weights)
         shader.uniform_sampler("patch_irradiance", irradiance)
         shader.uniform_sampler("emitted", self._emitted)
         for name in ("albedo", "emission"):
             shader.uniform_sampler(name, surfaces.textures[name])
         shader.image("field", self._field)
-        shader.uniform_int("first_slot", (surfaces.first + start,))
-        shader.uniform_int("first_layer", (start,))
+        shader.uniform_int("first_slot", (surfaces.first,))
         shader.uniform_int("own_texels", (int(own_texels),))
-        gpu.compute.dispatch(shader, count, 1, 1)
-        layers = (surfaces.first + start, start, count)
-        self._gradient.project(surfaces.textures, layers, self._texel_weights, irradiance, own_texels, _GROUP)
+        gpu.compute.dispatch(shader, len(layers_), 1, 1)
+        layers_and_count = (listed, len(layers_))
+        self._gradient.project(
+            surfaces.textures,
+            surfaces.first,
+            layers_and_count,
+            self._texel_weights,
+            irradiance,
+            own_texels,
+            _GROUP,
+        )
 
     def forget_emission(self) -> None:
         """No probe sees a sampled emitter."""
         self._gradient.forget_emission()
         self._emitted = allocate(len(self._nodes) * self.coefficients, "field coefficients")
 
-    def find_emission(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> None:
-        """What all or ``count`` probes from ``start`` see of sampled emitters; ``project`` and ``gather`` add it."""
+    def find_emission(self, surfaces: Surfaces, layers_: np.ndarray) -> None:
+        """What the probes in ``layers_`` (L,) see of sampled emitters; ``project`` and ``gather`` add it."""
         shader = program(
             "emission_project_comp",
             FACE=self.face,
@@ -340,18 +345,28 @@ class GpuBackend:
         )
         self.scene.bind_surfaces(shader)
         self.scene.bind_emitters(shader)
+        listed = numbers(layers_, "probes")
         shader.uniform_sampler("probe_slots", self.probe_slots)
+        shader.uniform_sampler("probe_layers", listed)
         shader.uniform_sampler("texel_weights", self._texel_weights)
         for name in ("geometry", "emission"):
             shader.uniform_sampler(name, surfaces.textures[name])
         shader.image("emitted", self._emitted)
         shader.image("emitted_gradient", self._gradient.emitted)
         shader.uniform_float("nearest", self._gradient.nearest)
-        shader.uniform_int("first_slot", (surfaces.first + start,))
-        shader.uniform_int("first_layer", (start,))
+        shader.uniform_int("first_slot", (surfaces.first,))
         shader.uniform_int("samples", (PROBE_RAYS,))
         shader.uniform_int("seed", (self.settings.seed,))
-        gpu.compute.dispatch(shader, surfaces.count if count is None else count, 1, 1)
+        gpu.compute.dispatch(shader, len(layers_), 1, 1)
+
+    @property
+    def slot_count(self) -> int:
+        return len(self._nodes)
+
+    @property
+    def light_textures(self) -> tuple[gpu.types.GPUTexture, gpu.types.GPUTexture]:
+        """Field and gradient of all slots, as ``read_field`` and ``read_gradient`` would read them."""
+        return self._field, self._gradient.texture
 
     def read_field(self) -> np.ndarray:
         """(slots, coefficients, 3) float32 copy of the field."""

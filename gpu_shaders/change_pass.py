@@ -7,6 +7,7 @@ from __future__ import annotations
 import gpu
 import numpy as np
 
+from ..core.scene_changes import ShapeChange
 from .backend import GpuBackend, Surfaces
 from .programs import program
 from .textures import allocate, read, upload
@@ -59,6 +60,16 @@ def resolve_again(backend: GpuBackend, surfaces: Surfaces, new_numbers: np.ndarr
         shader.uniform_int("first_slot", (surfaces.first,))
     _dispatch_layers(shader, backend.face, surfaces.count)
     return bool(read(rebind, 1, channels=1)[0, 0])
+
+
+def new_numbers(shape: ShapeChange, old_order: np.ndarray, new_order: np.ndarray) -> np.ndarray:
+    """(T,) number in the new leaf order of each triangle of the old one, −1 for those that are gone."""
+    before = np.arange(len(new_order)) if shape.triangle_map is None else shape.triangle_map
+    now = np.full(len(old_order), -1)
+    now[before[before >= 0]] = np.flatnonzero(before >= 0)
+    place = np.empty(len(new_order), int)
+    place[new_order] = np.arange(len(new_order))
+    return np.where(now[old_order] >= 0, place[now[old_order]], -1)
 
 
 def move_layers(backend: GpuBackend, old: Surfaces, new: Surfaces, from_layer: np.ndarray) -> None:

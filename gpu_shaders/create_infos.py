@@ -162,20 +162,20 @@ def _group_sums(info, defines: dict) -> None:
 
 
 def field_project_comp(info, defines):
-    slot = _samplers(info, "texel_weights", "patch_irradiance", "emitted")
+    slot = _samplers(info, "probe_layers", "texel_weights", "patch_irradiance", "emitted")
     _samplers(info, "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "field")
-    _ints(info, "first_slot", "first_layer", "own_texels")
+    _ints(info, "first_slot", "own_texels")
     _group_sums(info, defines)
     return {"compute": [*_PROBE_FILES, "texel_light_lib", "field_project_comp"]}
 
 
 def field_gradient_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
-    slot = _samplers(info, "texel_edges", "texel_weights", "patch_irradiance", "emitted_gradient")
+    slot = _samplers(info, "probe_layers", "texel_edges", "texel_weights", "patch_irradiance", "emitted_gradient")
     _samplers(info, "geometry", "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "field_gradient")
-    _ints(info, "first_slot", "first_layer", "own_texels")
+    _ints(info, "first_slot", "own_texels")
     info.push_constant("FLOAT", "nearest")
     _group_sums(info, defines)
     return {"compute": [*_PROBE_FILES, "texel_light_lib", "probe_emitter_lib", "field_gradient_comp"]}
@@ -296,11 +296,11 @@ def emission_project_comp(info, defines):
     info.define("LEAST_COSINE", repr(LEAST_COSINE))
     slot = _scene(info, defines)
     slot = _emitters(info, defines, slot)
-    slot = _samplers(info, "lights", "probe_slots", "texel_weights", first=slot)
+    slot = _samplers(info, "lights", "probe_slots", "probe_layers", "texel_weights", first=slot)
     _samplers(info, "geometry", "emission", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "emitted")
     _image(info, 1, "emitted_gradient")
-    _ints(info, "first_slot", "first_layer", "light_count", "samples", "seed")
+    _ints(info, "first_slot", "light_count", "samples", "seed")
     info.push_constant("FLOAT", "nearest")
     _group_sums(info, defines)
     return {

@@ -34,6 +34,11 @@ class GradientPass:
         self._result = self._zeros()
         self.forget_emission()
 
+    @property
+    def texture(self) -> gpu.types.GPUTexture:
+        """Gradients of all slots."""
+        return self._result
+
     def forget_emission(self) -> None:
         """No probe sees a sampled emitter."""
         self.emitted = self._zeros()
@@ -44,15 +49,17 @@ class GradientPass:
     def project(
         self,
         textures: dict,
-        layers: tuple[int, int, int],
+        first_slot: int,
+        layers: tuple[gpu.types.GPUTexture, int],
         texel_weights: gpu.types.GPUTexture,
         irradiance: gpu.types.GPUTexture,
         own_texels: bool,
         group: int,
     ) -> None:
-        """Gradients by the texel surfaces ``textures`` (geometry, albedo, emission) of ``layers``: first slot, first
-        layer, count. ``irradiance`` is that of patches, or of every texel by itself where ``own_texels``."""
-        first_slot, first_layer, count = layers
+        """Gradients by the texel surfaces ``textures`` (geometry, albedo, emission) of ``layers``, a list and its
+        length; ``first_slot`` is the slot of layer 0. ``irradiance`` is that of patches, or of every texel by itself
+        where ``own_texels``."""
+        listed, count = layers
         shader = program(
             "field_gradient_comp",
             FACE=self.face,
@@ -61,6 +68,7 @@ class GradientPass:
             GROUP=group,
             CANDIDATE_COUNT=PROBE_POINTS,
         )
+        shader.uniform_sampler("probe_layers", listed)
         shader.uniform_sampler("texel_edges", self._edges)
         shader.uniform_sampler("texel_weights", texel_weights)
         shader.uniform_sampler("patch_irradiance", irradiance)
@@ -69,7 +77,6 @@ class GradientPass:
             shader.uniform_sampler(name, textures[name])
         shader.image("field_gradient", self._result)
         shader.uniform_int("first_slot", (first_slot,))
-        shader.uniform_int("first_layer", (first_layer,))
         shader.uniform_int("own_texels", (int(own_texels),))
         shader.uniform_float("nearest", self.nearest)
         gpu.compute.dispatch(shader, count, 1, 1)

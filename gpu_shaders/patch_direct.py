@@ -14,6 +14,7 @@ import numpy as np
 
 from ..core.patches import ALL, EMITTERS, POINTS, SAMPLES, Part, direct_samples, light_parts
 from ..core.settings import BakeSettings
+from ..core.steps import Pace, Steps
 from .dispatch import dispatch_linear
 from .programs import program
 from .scene_textures import SceneTextures
@@ -48,9 +49,9 @@ class _PartLight:
 class PatchDirect:
     """``values`` (N, 4) float32 is the irradiance of all patches lit so far, ``texture`` the same on the GPU."""
 
-    def __init__(self, scene: SceneTextures, settings: BakeSettings):
+    def __init__(self, scene: SceneTextures, settings: BakeSettings, pace: Pace):
         self.effort = 1  # by which SAMPLES are multiplied
-        self._scene, self._settings = scene, settings
+        self._scene, self._settings, self._pace = scene, settings, pace
         self._together: list[tuple[int, int]] = []  # ranges of patches, each with its own mean light
         self._parts: dict[Part, _PartLight] = {}
         self._sum()
@@ -60,16 +61,18 @@ class PatchDirect:
         """Patches lit so far."""
         return self._together[-1][1] if self._together else 0
 
-    def add(self, points: gpu.types.GPUTexture, count: int) -> None:
-        """Lights those of ``count`` patches with ``points`` (see PatchFinder) that are not lit yet."""
+    def add(self, points: gpu.types.GPUTexture, count: int) -> Steps[None]:
+        """Lights those of ``count`` patches with ``points`` (see PatchFinder) that are not lit yet, in steps."""
         fresh = (self.count, count)
         self._together.append(fresh)
         for part in self._wanted_parts():
             self._parts.setdefault(part, _PartLight()).grow(*self.spread(part, points, *fresh))
-        self._light_what_is_due(points)
+            yield
+        yield from self._light_what_is_due(points)
 
-    def again(self, points: gpu.types.GPUTexture, changed: np.ndarray, emitters: bool) -> int:
-        """Direct light where lamps ``changed`` (lamp_count,) bool, or all sampled ``emitters``, or came or left.
+    def again(self, points: gpu.types.GPUTexture, changed: np.ndarray, emitters: bool) -> Steps[int]:
+        """Direct light where lamps ``changed`` (lamp_count,) bool, or all sampled ``emitters``, or came or left, in
+        steps.
 
         Returns the number of lamps that were lit from nothing.
         """
@@ -82,13 +85,14 @@ class PatchDirect:
             self._parts[part] = _PartLight()
             self._parts[part].grow(*self.spread(part, points, 0, self.count))
             lamps += 0 if part == EMITTERS else part[1] - part[0]
-        self._light_what_is_due(points)
+            yield
+        yield from self._light_what_is_due(points)
         return lamps
 
     def _wanted_parts(self) -> list[Part]:
         return light_parts(self._scene.lamp_count, self._scene.emitter_count > 0)
 
-    def _light_what_is_due(self, points: gpu.types.GPUTexture) -> None:
+    def _light_what_is_due(self, points: gpu.types.GPUTexture) -> Steps[None]:
         """Patches that were not lit, or with another number of samples than they should have."""
         for part, light in self._parts.items():
             wanted = np.empty(self.count, np.int8)
@@ -100,7 +104,7 @@ class PatchDirect:
                 target = allocate(self.count, "patches")
                 for index, samples in enumerate(SAMPLES):
                     chosen = due[wanted[due] == index]
-                    self.light(points, POINTS, chosen, samples * self.effort, target, part=part)
+                    yield from self.light(points, POINTS, chosen, samples * self.effort, target, part=part)
                 light.values[due] = read(target, self.count)[due]
                 light.sample_class = wanted
         self._sum()
@@ -125,16 +129,19 @@ class PatchDirect:
 
     def light(
         self, points, points_each: int, chosen: np.ndarray, samples: int, target, first_key: int = 0, part: Part = ALL
-    ) -> None:
+    ) -> Steps[None]:
         """Adds direct light by ``part`` of patches or texels ``chosen`` (L,) with ``points_each`` places in ``points``
-        to ``target``."""
+        to ``target``, in steps."""
         for portion in self._portions(part):
             lamps = 1 if portion == EMITTERS else portion[1] - portion[0]
             samples_each = max(1, _SAMPLES_EACH // lamps)
             at_once = max(1, _THREADS_AT_ONCE // -(-samples // samples_each))
-            for start in range(0, len(chosen), at_once):
-                some = chosen[start : start + at_once]
+
+            def light(start: int, number: int, portion=portion, samples_each=samples_each) -> None:
+                some = chosen[start : start + number]
                 self._light_portion(portion, points, points_each, some, samples, samples_each, target, first_key)
+
+            yield from self._pace.portions(f"direct {samples}", len(chosen), light, 1024, at_once)
 
     def _portions(self, part: Part) -> list[Part]:
         """``part`` in portions small enough for one thread, see patch_direct_comp.glsl."""

@@ -17,6 +17,7 @@ from ..core.extrapolation import STATES, reduced_rank
 from ..core.grid import Grid
 from ..core.patches import MOST_ROUNDS, POINTS, RAYS, effort, gather_rays
 from ..core.settings import BakeSettings
+from ..core.steps import Pace, Steps, run
 from .dispatch import dispatch_linear
 from .growing_array import GrowingArray, copy_elements
 from .patch_direct import PatchDirect
@@ -40,12 +41,12 @@ class _Rays:
 class PatchLight:
     """Patches of one bake with their light."""
 
-    def __init__(self, scene: SceneTextures, grid: Grid, settings: BakeSettings, world_texels):
+    def __init__(self, scene: SceneTextures, grid: Grid, settings: BakeSettings, world_texels, pace: Pace):
         """``world_texels``: the world's radiance as a linear texture, faces of ``settings.face``²; may be replaced."""
         self.patches = PatchFinder(scene, grid)
         self._scene, self._settings = scene, settings
         self.world_texels = world_texels
-        self._direct = PatchDirect(scene, settings)
+        self._direct = PatchDirect(scene, settings, pace)
         self._change = gpu.types.GPUTexture((1, 1), format="RGBA32F")
 
     @property
@@ -55,17 +56,17 @@ class PatchLight:
     # Light
     # ------------------------------------------------------------------------------------------------------------------
 
-    def light_new_patches(self) -> None:
-        """Direct light of the patches that were bound since the last call."""
+    def light_new_patches(self) -> Steps[None]:
+        """Direct light of the patches that were bound since the last call, in steps."""
         if self._direct.count == self.count:
             return
         if self._direct.count == 0:
             self._direct.effort = effort(self.count, self._settings.samples)
-        self._direct.add(self.patches.points, self.count)
+        yield from self._direct.add(self.patches.points, self.count)
 
-    def light_again(self, changed: np.ndarray, emitters: bool) -> int:
-        """Direct light of all patches where lamps ``changed`` (lamp_count,) bool, or sampled ``emitters`` did. Returns
-        the number of lamps that were computed."""
+    def light_again(self, changed: np.ndarray, emitters: bool) -> Steps[int]:
+        """Direct light of all patches where lamps ``changed`` (lamp_count,) bool, or sampled ``emitters`` did, in
+        steps. Returns the number of lamps that were computed."""
         return self._direct.again(self.patches.points, changed, emitters)
 
     @property
@@ -81,14 +82,9 @@ class PatchLight:
     # Rays
     # ------------------------------------------------------------------------------------------------------------------
 
-    def connect(self) -> None:
+    def connect(self) -> Steps[None]:
         """Traces the rays between patches, round by round until they find no surface that is no patch yet, and makes
-        room for the bounces."""
-        for _ in self.connect_in_steps():
-            pass
-
-    def connect_in_steps(self) -> Iterator[None]:
-        """The same, yielding between pieces of work."""
+        room for the bounces; in steps."""
         self._rays_each = RAYS * self._direct.effort
         self._ends, self._reflected = GrowingArray("rays", "R32F"), GrowingArray("rays")
         self._brought = GrowingArray("patches")
@@ -102,19 +98,19 @@ class PatchLight:
                 yield
             if stop == self.count:
                 break
-        self.light_new_patches()
+        yield from self.light_new_patches()
         self._carry()
         self._irradiance = [allocate(self.count, "patches") for _ in range(STATES)]
         yield
 
-    def carry_again(self) -> bool:
-        """What rays bring along and reflect, for another world or other materials; where they end stays.
+    def carry_again(self) -> Steps[bool]:
+        """What rays bring along and reflect, for another world or other materials, in steps; where they end stays.
 
         False if a ray that reflected nothing now does, or the other way round: then patches must be found anew.
         """
         before = self._reflecting()
         for _ in self._trace_patches(0, self.count):
-            pass
+            yield
         if (self._reflecting() != before).any():
             return False
         self._carry()
@@ -261,7 +257,7 @@ class PatchLight:
         rays_each = gather_rays(settings.samples)
         direct, result = allocate(count, "texels"), allocate(count, "texels")
         reflects = np.flatnonzero(read(hits, count)[:, 3] >= 0)
-        self._direct.light(hits, 1, reflects, settings.samples, direct, first_key)
+        run(self._direct.light(hits, 1, reflects, settings.samples, direct, first_key))
         reflected, brought = allocate(count * rays_each, "rays"), allocate(count, "texels")
         rays = self._trace(hits, 1, 0, count, rays_each, reflected, brought, settings.gather, first_key)
         ends = self.patches.bind_ends(rays.hits, rays.count, MOST_ROUNDS - 1)

@@ -11,10 +11,24 @@ from typing import Any
 import gpu
 
 from ..core.errors import NoGpuError
-from . import create_infos, measure_create_infos, patch_create_infos, relight_create_infos, viewport_create_infos
+from . import (
+    create_infos,
+    live_create_infos,
+    measure_create_infos,
+    patch_create_infos,
+    relight_create_infos,
+    viewport_create_infos,
+)
 
 _GLSL = Path(__file__).parent / "glsl"
-_BINDINGS = (create_infos, measure_create_infos, patch_create_infos, relight_create_infos, viewport_create_infos)
+_BINDINGS = (
+    create_infos,
+    live_create_infos,
+    measure_create_infos,
+    patch_create_infos,
+    relight_create_infos,
+    viewport_create_infos,
+)
 
 # Never emptied: in Blender 4.5 and 5.0 the address of a freed shader can be reused, and the old program then runs
 # silently.

@@ -14,6 +14,7 @@ from ..core import bvh
 from ..core.errors import InputError
 from ..core.scene_changes import SceneChanges, ShapeChange
 from ..core.snapshot import Image, Light, SceneSnapshot
+from ..core.steps import Pace, Steps, run
 from .scatter import scatter_rows
 from .textures import ROW, upload
 
@@ -35,6 +36,18 @@ class SceneTextures:
         Raises:
             InputError: more triangles than the GPU can number.
         """
+        run(self._fill(snapshot, origin, emitter_density, Pace(None)))
+
+    @classmethod
+    def make(
+        cls, snapshot: SceneSnapshot, origin: np.ndarray, emitter_density: np.ndarray, pace: Pace
+    ) -> Steps[SceneTextures]:
+        """The same in steps."""
+        scene = cls.__new__(cls)
+        yield from scene._fill(snapshot, origin, emitter_density, pace)
+        return scene
+
+    def _fill(self, snapshot: SceneSnapshot, origin: np.ndarray, density: np.ndarray, pace: Pace) -> Steps[None]:
         if len(snapshot.triangles) > _MOST_TRIANGLES:
             raise InputError(
                 f"scene '{snapshot.name}' has {len(snapshot.triangles)} triangles, {_MOST_TRIANGLES} is the most; hide "
@@ -42,9 +55,17 @@ class SceneTextures:
             )
         self._origin = np.asarray(origin, float)
         self._textures: dict = {}
-        self._build(snapshot)
-        self._send_surfaces(snapshot, emitter_density)
-        self._send_images(snapshot)
+        corners = (snapshot.triangle_positions - self._origin).astype(np.float32)
+        self._take_hierarchy(corners, (yield from pace.in_background(bvh.build, corners)))
+        yield
+        rows = yield from pace.in_background(self._surface_rows, snapshot, density, slice(None))
+        for name, values in rows.items():
+            self._textures[name] = upload(values, name.replace("_", " "))
+            yield
+        self.has_images = bool(snapshot.images)
+        if self.has_images:
+            self._upload_images(*(yield from pace.in_background(_pack_images, snapshot.images)))
+            yield
         self._suns = pack_lights([], self._origin)
         self.set_lights(snapshot.lights, self._origin)
 
@@ -81,10 +102,14 @@ class SceneTextures:
 
     def _build(self, snapshot: SceneSnapshot) -> None:
         corners = (snapshot.triangle_positions - self._origin).astype(np.float32)
-        self.hierarchy = self._built = bvh.build(corners)
-        self.corners = corners[self.hierarchy.order]
+        self._take_hierarchy(corners, bvh.build(corners))
+
+    def _take_hierarchy(self, corners: np.ndarray, hierarchy: bvh.Hierarchy) -> None:
+        """``hierarchy`` was built around ``corners`` (T, 3, 3)."""
+        self.hierarchy = self._built = hierarchy
+        self.corners = corners[hierarchy.order]
         self.triangle_count = len(corners)
-        self._textures["bvh_nodes"] = upload(self.hierarchy.nodes, "hierarchy nodes")
+        self._textures["bvh_nodes"] = upload(hierarchy.nodes, "hierarchy nodes")
 
     def _reshape(self, snapshot: SceneSnapshot, shape: ShapeChange) -> str:
         """Refits the hierarchy where that serves."""
@@ -105,6 +130,15 @@ class SceneTextures:
     def _send_surfaces(self, snapshot: SceneSnapshot, density: np.ndarray, only: np.ndarray | None = None) -> None:
         """Materials, emitters, and corners and attributes of all triangles or of those at ``only`` (K,) in leaf
         order."""
+        for name, values in self._surface_rows(snapshot, density, slice(None) if only is None else only).items():
+            if only is None or name in ("materials", "emitters"):
+                self._textures[name] = upload(values, name.replace("_", " "))
+            elif len(only):
+                scatter_rows(self._textures[name], only, values)
+
+    def _surface_rows(self, snapshot: SceneSnapshot, density: np.ndarray, at) -> dict[str, np.ndarray]:
+        """Textures' contents by name: materials, emitters, and corners and attributes of the triangles ``at`` in leaf
+        order. Notes what of it decides about shaders."""
         order = self.hierarchy.order
         clips = np.array([m.alpha_threshold > 0 for m in snapshot.materials] or [False])
         self.has_alpha = bool(clips.any())
@@ -114,29 +148,27 @@ class SceneTextures:
         # Nearer than this a direction about the normal finds an emitter at least as often as a point on the emitters
         # falls there.
         self.emitter_reach = (np.pi * sampled.min()) ** -0.5 if len(sampled) else 0.0
-        self._textures["materials"] = upload(_materials(snapshot), "materials")
-        self._textures["emitters"] = upload(_emitters(self._density, self.corners, order), "emitters")
-
-        at = slice(None) if only is None else only
         material = np.clip(snapshot.material_index[order[at]], 0, max(len(snapshot.materials) - 1, 0))
         corners = self.corners[at]
         rows = np.zeros((len(corners), 3, 4), np.float32)
         rows[:, :, :3] = corners
         rows[:, 0, 3] = self.hierarchy.leaf_end[at]
         rows[:, 1, 3] = clips[material]
-        attributes = _attributes(snapshot, order[at], material, corners, self._density[at])
-        for name, values in (("triangle_corners", rows), ("triangle_attributes", attributes)):
-            if only is None:
-                self._textures[name] = upload(values, name.replace("_", " "))
-            elif len(only):
-                scatter_rows(self._textures[name], only, values)
+        return {
+            "materials": _materials(snapshot),
+            "emitters": _emitters(self._density, self.corners, order),
+            "triangle_corners": rows,
+            "triangle_attributes": _attributes(snapshot, order[at], material, corners, self._density[at]),
+        }
 
     def _send_images(self, snapshot: SceneSnapshot) -> None:
         self.has_images = bool(snapshot.images)
         if self.has_images:
-            table, texels = _pack_images(snapshot.images)
-            self._textures["image_table"] = upload(table, "images")
-            self._textures["image_texels"] = upload(texels, "image texels", "RGBA16F")
+            self._upload_images(*_pack_images(snapshot.images))
+
+    def _upload_images(self, table: np.ndarray, texels: np.ndarray) -> None:
+        self._textures["image_table"] = upload(table, "images")
+        self._textures["image_texels"] = upload(texels, "image texels", "RGBA16F")
 
     @property
     def surface_defines(self) -> dict:

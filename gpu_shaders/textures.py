@@ -25,6 +25,13 @@ def upload(data: np.ndarray, what: str, pixel: str = "RGBA32F") -> gpu.types.GPU
     return gpu.types.GPUTexture((ROW, rows), format=pixel, data=buffer)
 
 
+def numbers(values: np.ndarray, what: str) -> gpu.types.GPUTexture:
+    """``values`` (N,) as a linear array, in the first channel."""
+    rows = np.zeros((len(values), 4), np.float32)
+    rows[:, 0] = values
+    return upload(rows, what)
+
+
 def allocate(elements: int, what: str, pixel: str = "RGBA32F") -> gpu.types.GPUTexture:
     """Linear array of ``elements`` zeros."""
     texture = gpu.types.GPUTexture((ROW, _rows(elements, what)), format=pixel)
@@ -50,6 +57,13 @@ def read(texture: gpu.types.GPUTexture, elements: int, channels: int = 4) -> np.
     # Blender 4.5 and 5.0 export wrong strides for buffers of more than one dimension.
     buffer.dimensions = texture.width * texture.height * channels
     return np.frombuffer(buffer, np.float32).reshape(-1, channels)[:elements].copy()
+
+
+def wait_for_gpu() -> None:
+    """Returns when the GPU has done what it was told so far: commands are carried out in order."""
+    mark = gpu.types.GPUTexture((1, 1), format="R32F")
+    mark.clear(format="FLOAT", value=(0.0,))
+    mark.read()
 
 
 def _rows(elements: int, what: str) -> int:

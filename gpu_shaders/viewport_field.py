@@ -61,6 +61,17 @@ class FieldTextures:
             self._textures["node_marks"] = upload(self._marks, "grid nodes")
             self._error_is_known = True
 
+    @property
+    def light_textures(self) -> tuple[gpu.types.GPUTexture, gpu.types.GPUTexture]:
+        """Coefficients and gradients, to be written to."""
+        return self._textures["field_in"], self._textures["gradient_in"]
+
+    def take_light_of(self, other: FieldTextures) -> None:
+        """Takes coefficients and gradients from ``other``, which is given up, if it has as many for as many nodes."""
+        if other.bands == self.bands and other.field.grid.resolution == self.field.grid.resolution:
+            for name in ("field_in", "gradient_in"):
+                self._textures[name] = other._textures[name]
+
     def bind(self, shader) -> None:
         for name, texture in self._textures.items():
             shader.uniform_sampler(name, texture)

@@ -15,7 +15,7 @@ from ..scene.field_storage import remove_field, stored_text
 from . import kept_bakes, names, stale
 from .bake_task import BakeTask
 from .sidebar import redraw_sidebars
-from .volume_choice import can_read_scene, chosen_volumes, in_object_mode, volumes_of
+from .volume_choice import can_read_scene, chosen_volumes, has_volume, in_object_mode, volumes_of
 
 _INTERVAL_SECONDS = 0.01  # between two timer events
 _BUDGET_SECONDS = 0.03  # of work in one; a single step may take longer
@@ -79,10 +79,7 @@ class _BakesVolumes:
         if _running is not None:
             cls.poll_message_set("A bake is running; wait, or cancel it")
             return False
-        if not volumes_of(context.scene):
-            cls.poll_message_set("Add a probe volume first: Add › Light Probe › Gridlight Volume")
-            return False
-        return True
+        return has_volume(cls, context)
 
     def _task(self, context) -> BakeTask:
         chosen = chosen_volumes(context, self.everything)

@@ -18,6 +18,7 @@ from ..core.grid import Grid
 from ..core.probe_edits import ProbeEdits
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
+from ..core.steps import STEP_SECONDS, Pace
 from ..formats import probe_file
 from ..formats.probe_metadata import provenance, scene_hash
 from ..gpu_shaders.context import device_description, ensure_context
@@ -53,6 +54,7 @@ class BakeTask:
         self._view_layer = view_layer.name
         self._volumes = [volume.session_uid for volume in volumes]
         self._stop_reason = ""
+        self._pace = Pace(STEP_SECONDS)  # of what is computed beside the bakes
         self._steps = self._run()
 
     def __next__(self) -> None:
@@ -98,6 +100,7 @@ class BakeTask:
             raise InputError("the scene is gone")
         volumes = self._find_volumes()
         grids = [grid_of(volume) for volume in volumes]
+        quality = scene.gridlight.quality
         edits = [read_edits(scene, volume) for volume in volumes]
         for grid in grids:
             probe_file.check_size(grid, self.settings.bands)
@@ -107,7 +110,9 @@ class BakeTask:
         except RuntimeError as error:  # Blender could not evaluate the scene at render quality now
             raise InputError(f"the scene cannot be read: {error}") from error
         yield
-        shown = scene_hash(read_scene(scene, view_layer, live=True))
+        shown_now = read_scene(scene, view_layer, live=True)
+        yield
+        shown = yield from self._pace.in_background(scene_hash, shown_now)
         for warning in snapshot.warnings:
             self.progress.warn(warning)
         yield
@@ -117,8 +122,14 @@ class BakeTask:
             bakes.append((yield from self._bake(uid, snapshot, grid, edit)))
         results = [bake.session.result for bake in bakes]
         self.outcome = _in_words(results, time.perf_counter() - started)
-        for volume, result in zip(self._find_volumes(), results):
-            self._store(volume, snapshot, result, shown)
+        device = device_description()
+        metadata = []
+        for result in results:
+            warnings = [*self.progress.warnings, *result.warnings]
+            told = snapshot, self.settings, device, result.iterations, result.converged, warnings
+            metadata.append((yield from self._pace.in_background(provenance, *told)))
+        for volume, result, about in zip(self._find_volumes(), results, metadata):
+            self._store(volume, result, about, shown, quality)
         kept_bakes.keep(dict(zip(self._volumes, bakes)))
 
     def _bake(
@@ -147,11 +158,9 @@ class BakeTask:
             raise InputError("its volume or scene was deleted")
         return volumes
 
-    def _store(self, volume: bpy.types.Object, snapshot: SceneSnapshot, result: BakeResult, viewport_hash: str) -> None:
-        warnings = [*self.progress.warnings, *result.warnings]
-        metadata = provenance(
-            snapshot, self.settings, device_description(), result.iterations, result.converged, warnings
-        )
+    def _store(
+        self, volume: bpy.types.Object, result: BakeResult, metadata: dict, viewport_hash: str, quality: str
+    ) -> None:
         result.field.metadata = {**result.field.metadata, **metadata}
         details = {
             "outcome": self.outcome,
@@ -161,7 +170,7 @@ class BakeTask:
             "energy": [float(value) for value in result.energy],
             "change": [float(value) for value in result.change],
             "notes": result.notes,
-            "quality": bpy.data.scenes[snapshot.name].gridlight.quality,
+            "quality": quality,
         }
         store_field(volume, result.field, metadata["scene_hash"], details)
 

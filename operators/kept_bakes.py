@@ -15,6 +15,8 @@ from ..bake.session import BakeSession
 from ..core.grid import Grid
 from ..core.probe_edits import ProbeEdits
 from ..core.settings import BakeSettings
+from ..core.steps import STEP_SECONDS, Pace
+from ..gpu_shaders.textures import wait_for_gpu
 
 
 class Relay:
@@ -41,7 +43,8 @@ class KeptBake:
 
     def __init__(self, grid: Grid, settings: BakeSettings, edits: ProbeEdits | None, reporter: Reporter, snapshot):
         self.relay = Relay(reporter)
-        self.session = BakeSession(snapshot, grid, settings, self.relay, edits)
+        pace = Pace(STEP_SECONDS, wait_for_gpu)
+        self.session = BakeSession(snapshot, grid, settings, self.relay, edits, pace=pace)
         self._grid, self._settings, self._edits = grid, settings, edits or ProbeEdits.none(grid)
 
     def fits(self, grid: Grid, settings: BakeSettings, edits: ProbeEdits | None) -> bool:

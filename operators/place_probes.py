@@ -14,7 +14,7 @@ from ..core.errors import GridlightError, InputError
 from ..scene import probe_objects
 from ..scene.read import read_scene
 from . import names
-from .volume_choice import can_read_scene, chosen_volumes, grid_of, in_object_mode, volumes_of
+from .volume_choice import can_read_scene, chosen_volumes, grid_of, has_volume, in_object_mode, volumes_of
 
 
 class GRIDLIGHT_OT_place_probes(bpy.types.Operator):
@@ -27,7 +27,7 @@ class GRIDLIGHT_OT_place_probes(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return can_read_scene(cls, context)
+        return can_read_scene(cls, context) and has_volume(cls, context)
 
     def execute(self, context):
         scene = context.scene
@@ -60,7 +60,7 @@ class GRIDLIGHT_OT_clear_probes(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return in_object_mode(cls, context)
+        return in_object_mode(cls, context) and _are_placed(cls, context)
 
     def execute(self, context):
         count = probe_objects.clear_probes(context.scene)
@@ -81,7 +81,7 @@ class GRIDLIGHT_OT_reset_probes(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return in_object_mode(cls, context)
+        return in_object_mode(cls, context) and _are_placed(cls, context)
 
     def execute(self, context):
         scene = context.scene
@@ -93,6 +93,14 @@ class GRIDLIGHT_OT_reset_probes(bpy.types.Operator):
             count += probe_objects.reset(scene, volume, only=set(context.selected_objects) if self.selected else None)
         self.report({"INFO"}, f"{count} probes are back in their places")
         return {"FINISHED"}
+
+
+def _are_placed(operator, context: bpy.types.Context) -> bool:
+    """For ``poll``: there are placed probes, or a line that says so."""
+    if probe_objects.any_placed(context.scene):
+        return True
+    operator.poll_message_set("No probes are placed; place them first")
+    return False
 
 
 def _place(scene: bpy.types.Scene, volume: bpy.types.Object, triangles: np.ndarray) -> np.ndarray:

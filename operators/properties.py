@@ -120,7 +120,8 @@ class GridlightPreview(bpy.types.PropertyGroup):
     )
     frame_budget_ms: FloatProperty(
         name="Frame Budget",
-        description="Time that updates may take from each frame, in milliseconds; 16.6 keeps 60 frames a second",
+        description="Time that a frame may take, in milliseconds, drawing and updates together; 16.6 keeps 60 frames a "
+        "second. Updates take what drawing leaves, at least half",
         default=16.6,
         min=1.0,
         max=1000.0,

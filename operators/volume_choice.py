@@ -62,3 +62,11 @@ def in_object_mode(operator, context: bpy.types.Context) -> bool:
         return True
     operator.poll_message_set("Switch to Object Mode first")
     return False
+
+
+def has_volume(operator, context: bpy.types.Context) -> bool:
+    """For ``poll``: the scene has a volume, or a line that says so."""
+    if volumes_of(context.scene):
+        return True
+    operator.poll_message_set("Add a probe volume first: Add › Light Probe › Gridlight Volume")
+    return False

@@ -135,6 +135,11 @@ def reset(scene: bpy.types.Scene, volume_object: bpy.types.Object, only: set[bpy
     return len(moved)
 
 
+def any_placed(scene: bpy.types.Scene) -> bool:
+    """Whether probes of some volume are placed, as objects or as points."""
+    return _find(scene, "") is not None
+
+
 def placed_count(scene: bpy.types.Scene, volume_object: bpy.types.Object) -> int | None:
     """How many probes were placed for a volume, as objects or as points; None where none are."""
     _, record = _record_of(_find(scene, ""), volume_object)

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import time
+
 import bpy
 import gpu
 import numpy as np
@@ -48,8 +50,9 @@ class GRIDLIGHT_RE_engine(bpy.types.RenderEngine):
             self.update_stats("Gridlight", session.message or "Reading the scene")
             return
         shading = Shading(highlight=context.scene.gridlight.preview.highlight)
+        started = time.perf_counter()
         picture, _ = handlers.images.draw(context, session, shading, None)
-        session.readout.frame()
+        session.readout.frame(time.perf_counter() - started)
         gpu.state.depth_test_set("ALWAYS")
         gpu.state.depth_mask_set(True)
         gpu.state.blend_set("ALPHA_PREMULT")

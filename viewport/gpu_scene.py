@@ -42,9 +42,14 @@ class GpuScene:
                 self.fields[volume.name] = FieldTextures(field, self.origin)
         self.drawing.set_fields(list(self.fields.values()))
 
-    def show_fields(self, fields: dict[str, Field]) -> None:
-        """Shows ``fields`` instead of those of the volumes of these names."""
-        self.fields |= {name: FieldTextures(field, self.origin) for name, field in fields.items()}
+    def show_fields(self, fields: dict[str, Field], with_old_light: bool = False) -> None:
+        """Shows ``fields`` instead of those of the volumes of these names; ``with_old_light`` in the light that is
+        shown now, where it has the same form."""
+        for name, field in fields.items():
+            shown = FieldTextures(field, self.origin)
+            if with_old_light and name in self.fields:
+                shown.take_light_of(self.fields[name])
+            self.fields[name] = shown
         self.drawing.set_fields(list(self.fields.values()))
 
     def set_lights(self, lights: list[Light]) -> None:

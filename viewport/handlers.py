@@ -7,6 +7,8 @@ that a scene's preview is switched on, or a view is rendered by Gridlight's engi
 
 from __future__ import annotations
 
+import time
+
 import bpy
 import gpu
 from bpy.app.handlers import persistent
@@ -112,8 +114,9 @@ def _draw_view() -> None:
     shading, probes = shading_of(preview)
     # A black world would hide the grid and the theme's backdrop and show nothing instead.
     backdrop = session.gpu.drawing.world_shines
+    started = time.perf_counter()
     picture, _ = images.draw(context, session, shading, probes, backdrop)
-    session.readout.frame()
+    session.readout.frame(time.perf_counter() - started)
     gpu.state.depth_test_set("LESS_EQUAL")
     gpu.state.depth_mask_set(True)
     gpu.state.blend_set("ALPHA_PREMULT")
@@ -181,7 +184,7 @@ def _tick() -> float | None:
         session.update(scene, _view_layer(scene))
         preview = scene.gridlight.preview
         if preview.live and preview.enabled:
-            session.relight(scene, preview.frame_budget_ms / 1000)
+            session.relight(scene, _left_for_light(preview.frame_budget_ms / 1000, session))
             busy |= session.is_relighting
         busy |= session.is_pending
         settings = _shown_settings(scene)
@@ -196,6 +199,11 @@ def _tick() -> float | None:
             area.tag_redraw()
             busy = True
     return _FRAME_SECONDS if busy else _IDLE_SECONDS
+
+
+def _left_for_light(frame_seconds: float, session: sessions.SceneSession) -> float:
+    """Of a frame, what drawing leaves; half of it where drawing takes more."""
+    return max(frame_seconds - session.readout.draw_seconds, frame_seconds / 2)
 
 
 def _shown_settings(scene: bpy.types.Scene) -> tuple:

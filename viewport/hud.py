@@ -50,11 +50,18 @@ def lines(context: bpy.types.Context, session: SceneSession, preview) -> list[st
     if settings.view_transform != "Standard" and preview.mode in ("FULL", "DIRECT", "INDIRECT", "IRRADIANCE"):
         shown.append(f"The preview's colours are those of Standard; this scene renders with {settings.view_transform}")
     if preview.show_rate:
-        readout = session.readout
-        rate = f"{readout.frames_per_second:.0f} frames/s"
-        age = f"light {readout.age_seconds:.1f} s old" if readout.age_seconds else "light up to date"
-        shown.append(f"{rate}, {readout.probes_per_frame} probes/frame, {age}" if session.gpu.fields else rate)
+        shown.append(_rates(session))
     return shown
+
+
+def _rates(session: SceneSession) -> str:
+    readout = session.readout
+    parts = [f"{readout.frames_per_second:.0f} frames/s" if readout.frames_per_second else "at rest"]
+    if session.gpu.fields:
+        if readout.probes_per_frame:
+            parts.append(f"{readout.probes_per_frame} probes/frame")
+        parts.append(f"light {readout.age_seconds:.1f} s old" if readout.age_seconds else "light up to date")
+    return ", ".join(parts)
 
 
 def write(text: str, x: float, y: float, scale: float, color=_TEXT, size: int = _SIZE) -> None:

@@ -12,17 +12,18 @@ from dataclasses import replace
 
 import bpy
 
-from ..core.conventions import ACTIVE
 from ..core.errors import GridlightError
 from ..core.field import Field
 from ..core.snapshot import SceneSnapshot
+from ..gpu_shaders.live_field import LiveField
 from ..scene.notices import Notices
 from ..scene.probe_objects import read_edits
 from ..scene.read import read_lights, read_scene
 from ..scene.world import read_world
 from .changes import FIELDS, LIGHTS, SURFACES, WORLD
+from .fade import Fade
 from .gpu_scene import GpuScene
-from .live_bake import LiveBake, Target
+from .live_bake import LiveBake, Progress, Target
 from .readout import Readout
 
 _PATIENCE = 3.0  # times the duration of a read: how long a scene must stand still before it is read again
@@ -41,6 +42,8 @@ class SceneSession:
         self.readout = Readout()
         self._live = LiveBake()
         self._live_fields: dict[str, Field] = {}  # what it found since the last bake was stored
+        self._leads: dict[str, LiveField] = {}  # bring shown fields to where live light is
+        self._fade = Fade()
         self.gpu: GpuScene | None = None  # None before the first read, and for scenes without surface
         self.snapshot: SceneSnapshot | None = None
         self._pending = {SURFACES}
@@ -60,7 +63,7 @@ class SceneSession:
             self._pending |= kinds
             self._changed_at = time.perf_counter()
             if kinds - {FIELDS}:
-                self.readout.changed()
+                self.readout.changed(self._changed_at)
                 self._light_is_old = True
 
     @property
@@ -92,31 +95,53 @@ class SceneSession:
         """Lets the light of volumes that were baked follow what changed since, for about ``budget_seconds``."""
         if self.gpu is None or not self.gpu.fields or self._pending:
             return
-        if self._light_is_old and not self._live.is_waiting:
+        live = self._live
+        if self._light_is_old:
             targets = [
                 Target(item.field.grid, read_edits(scene, scene.objects[name]))
                 for name, item in self.gpu.fields.items()
                 if name in scene.objects
             ]
-            self._live.follow(self.snapshot, targets, scene.gridlight.bake_settings())
+            live.follow(self.snapshot, targets, scene.gridlight.bake_settings(), self._changed_at)
             self._light_is_old = False
-        if not self._live.is_working:
-            return
-        self.readout.worked()
-        fields = self._live.step(budget_seconds)
+        if live.is_working:
+            settles = live.is_settling
+            progress = live.step(budget_seconds)
+            if not settles:
+                self.readout.worked(progress.probes)
+            self._show(progress)
+        if self._fade.is_on:
+            share = self._fade.share()
+            for lead in self._leads.values():
+                lead.follow(share)
+            self.version += 1
+        elif live.is_rough:
+            live.settle()
+
+    def _show(self, progress: Progress) -> None:
+        """Brings new light to the views, or on its way there."""
         if self._live.message:
             self.message = self._live.message
-        if fields:
-            self._live_fields = fields
-            self.gpu.show_fields(fields)
-            probes = sum(int((field.state == ACTIVE).sum()) for field in fields.values())
-            self.readout.relit(probes, up_to_date=not (self._live.is_working or self._light_is_old))
+        if progress.probes:
+            self._fade.restart()
+        if progress.fields:
+            self._live_fields |= progress.fields
+            self.gpu.show_fields(progress.fields, with_old_light=not progress.is_settled)
+            for name in progress.fields:
+                self._leads[name] = LiveField(self._live.backend_of(name), self.gpu.fields[name])
             self.version += 1
+        self.readout.shows(self._live.shown_moment)
 
     @property
     def is_relighting(self) -> bool:
         """Whether ``relight`` has something to do."""
-        return self.gpu is not None and bool(self.gpu.fields) and (self._live.is_working or self._light_is_old)
+        busy = self._live.is_working or self._live.is_rough or self._light_is_old or self._fade.is_on
+        return self.gpu is not None and bool(self.gpu.fields) and busy
+
+    def _forget_leads(self) -> None:
+        """What is shown was replaced: live light must come as a whole before it can lead again."""
+        self._leads.clear()
+        self._live.show_whole()
 
     def _read_part(self, kinds: set[str], scene, view_layer) -> None:
         if LIGHTS in kinds:
@@ -126,12 +151,14 @@ class SceneSession:
             self.snapshot = replace(self.snapshot, world=read_world(scene, Notices()))
             self.gpu.set_world(self.snapshot.world)
         if FIELDS in kinds:
+            self._forget_leads()
             self.gpu.load_fields(scene)
             self._light_is_old = False
-            self.readout.relit(0, up_to_date=True)
+            self.readout.forget_changes()
 
     def _read_everything(self, scene, view_layer) -> None:
         started = time.perf_counter()
+        self._forget_leads()
         self.gpu = None
         self.snapshot = read_scene(scene, view_layer, live=True)
         if len(self.snapshot.triangles):

@@ -7,6 +7,7 @@
  * CANDIDATE_COUNT points lie in order of the emitters and weigh what they would send if nothing stood between; `samples` of them get a
  * ray, one each time the running sum of the weights has grown by an equal step. Front, back and every part of a lamp so get their
  * exact share of the rays (systematic resampling; Kitagawa, "Monte Carlo Filter and Smoother", 1996, A.1).
+ * probe_layers, 1 element a probe of the dispatch: its layer; its slot is that much after first_slot
  * Dispatch: one group of GROUP threads a probe; each takes a run of candidates; fixed order of summation.
  */
 
@@ -43,10 +44,10 @@ Candidate candidate(vec3 origin, uvec3 key, int index)
 
 void main()
 {
-  int probe = int(gl_WorkGroupID.x);
   int lane = int(gl_LocalInvocationID.x);
-  int layer = first_layer + probe;
-  vec4 slot = element(probe_slots, first_slot + probe);
+  int layer = int(element(probe_layers, int(gl_WorkGroupID.x)).x);
+  int slot_index = first_slot + layer;
+  vec4 slot = element(probe_slots, slot_index);
   vec3 sum[COEFFICIENTS];
   vec3 gradient[3 * GRADIENT_COEFFICIENTS];
   float basis[COEFFICIENTS];
@@ -108,7 +109,6 @@ void main()
       }
     }
   }
-  int slot_index = first_slot + probe;
   for (int c = 0; c < COEFFICIENTS; c++) {
     partial_sums[c * GROUP + lane] = vec4(sum[c], 0.0);
   }

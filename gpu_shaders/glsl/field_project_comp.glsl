@@ -2,6 +2,7 @@
  * `emitted`, what emission_project_comp found of sampled emitters.
  *
  * With own_texels the irradiance of texel i of the dispatch's probe p is element p · 6 · FACE² + i.
+ * probe_layers, 1 element a probe of the dispatch: its layer; its slot is that much after first_slot
  * Dispatch: one group of GROUP threads a probe. Threads take texels in strides. Reference: core/reference_bake.py.
  */
 
@@ -9,7 +10,7 @@ void main()
 {
   int probe = int(gl_WorkGroupID.x);
   int lane = int(gl_LocalInvocationID.x);
-  int layer = first_layer + probe;
+  int layer = int(element(probe_layers, probe).x);
   vec3 sum[COEFFICIENTS];
   for (int c = 0; c < COEFFICIENTS; c++) {
     sum[c] = vec3(0.0);
@@ -31,7 +32,7 @@ void main()
   }
   barrier();
   for (int c = lane; c < COEFFICIENTS; c += GROUP) {
-    int index = (first_slot + probe) * COEFFICIENTS + c;
+    int index = (first_slot + layer) * COEFFICIENTS + c;
     imageStore(field, element_position(index), vec4(group_sum(c) + element(emitted, index).rgb, 0.0));
   }
 }

@@ -12,6 +12,7 @@ from gridlight.core.orientation import inside_solid
 from gridlight.core.patches import POINTS
 from gridlight.core.reference_bake import ReferenceBake
 from gridlight.core.reference_scene import Surfaces
+from gridlight.core.steps import run
 from gridlight.gpu_shaders.backend import GpuBackend
 from gridlight.gpu_shaders.textures import allocate, read, upload
 from shader_runner import read_layers, run
@@ -51,7 +52,7 @@ class Stages:
         self.backend.allocate_field()
         self.gpu = self.backend.surfaces(0, len(nodes))
         self.capture(method)
-        self.backend.bind(self.gpu)
+        run(self.backend.bind(self.gpu))
 
     @property
     def light(self):
@@ -106,7 +107,7 @@ class Stages:
         hits = self.hits_texture()
         count = self.gpu.count * 6 * self.settings.face**2
         direct = allocate(count, "test")
-        self.light._direct.light(hits, 1, np.flatnonzero(self.hits()[:, 3] >= 0), samples, direct)
+        run(self.light._direct.light(hits, 1, np.flatnonzero(self.hits()[:, 3] >= 0), samples, direct))
         return read(direct, count)[:, :3].reshape(self.gpu.count, -1, 3)
 
     # Patches
@@ -138,12 +139,12 @@ class Stages:
     def direct_of(self, patches, samples):
         """(C, 3) direct light of ``patches`` (C,) by so many samples."""
         direct = allocate(self.light.count, "test")
-        self.light._direct.light(upload(self.points, "test"), POINTS, patches, samples, direct)
+        run(self.light._direct.light(upload(self.points, "test"), POINTS, patches, samples, direct))
         return read(direct, self.light.count)[patches, :3].astype(float)
 
     def direct(self):
         """(N, 3) direct light as the bake takes it."""
-        self.light.light_new_patches()
+        run(self.light.light_new_patches())
         return read(self.light.direct, self.light.count)[:, :3].astype(float)
 
     def rays(self, first, count, rays_each, segments=1):
@@ -160,8 +161,8 @@ class Stages:
 
     def connect(self):
         """Connections of all patches, among them those that only rays see."""
-        self.light.light_new_patches()
-        self.light.connect()
+        run(self.light.light_new_patches())
+        run(self.light.connect())
         count, each = self.light.count, self.light._rays_each
         return Connections(
             read(self.light._brought.texture, count)[:, :3].astype(float),
@@ -193,11 +194,11 @@ class Stages:
 
     def project(self):
         """(P, K, 3) the field by the newest irradiance, without sampled emitters."""
-        self.backend.project(self.gpu)
+        self.backend.project(self.gpu, np.arange(self.gpu.count))
         return self.backend.read_field()
 
     def project_emitters(self):
         """(P, K, 3) what sampled emitters add to the field."""
         before = self.project()
-        self.backend.find_emission(self.gpu)
+        self.backend.find_emission(self.gpu, np.arange(self.gpu.count))
         return self.project() - before

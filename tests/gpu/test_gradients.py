@@ -39,7 +39,9 @@ def lit(snapshot, **settings):
     stages.direct()
     stages.connect()
     irradiance = stages.iterate(True)[0]
-    stages.backend.find_emission(stages.gpu) if stages.backend.scene.emitter_count else None
+    stages.backend.find_emission(
+        stages.gpu, np.arange(stages.gpu.count)
+    ) if stages.backend.scene.emitter_count else None
     stages.project()
     surfaces = stages.surfaces()
     expected = stages.reference.gradient(surfaces, stages.reference.reflected(surfaces, stages.patch(), irradiance))

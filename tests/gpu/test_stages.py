@@ -19,6 +19,7 @@ from gridlight.core.reference_bake import bake as reference_bake
 from gridlight.core.reference_light import bounce
 from gridlight.core.settings import BakeSettings
 from gridlight.core.snapshot import Light
+from gridlight.gpu_shaders.probe_views import sightings
 from gridlight.gpu_shaders.textures import read, upload
 from small_scenes import all_lights, bake, cluttered_room, frame, irradiance_at_nodes
 from stages import PatchesOfGpu, Stages
@@ -243,7 +244,7 @@ def test_statistics(lit):
 def test_object_sightings(lit):
     reflected = lit.reference.reflected(lit.surfaces(), lit.patch(), lit.direct())
     vote = ShellVote(lit.backend.object_count)
-    vote.add(lit.backend.sightings(lit.gpu))
+    vote.add(sightings(lit.backend, lit.gpu))
     np.testing.assert_array_equal(vote.shells(), lit.reference.shells(lit.surfaces(), reflected))
 
 
