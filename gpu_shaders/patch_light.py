@@ -133,7 +133,16 @@ class PatchLight:
             yield first * self._rays_each, rays
 
     def _trace(
-        self, points, points_each: int, first: int, count: int, rays_each: int, reflected, brought, segments=1, first_key=0
+        self,
+        points,
+        points_each: int,
+        first: int,
+        count: int,
+        rays_each: int,
+        reflected,
+        brought,
+        segments=1,
+        first_key=0,
     ) -> _Rays:
         """``rays_each`` rays of each of ``count`` patches from ``first``, with ``points_each`` places in ``points``.
         What they reflect and bring along goes into arrays of all rays and of all patches."""

@@ -5,6 +5,7 @@ stage."""
 from dataclasses import dataclass, replace
 
 import numpy as np
+from gridlight.core import steps
 from gridlight.core.conventions import INVALID
 from gridlight.core.cubemap import octahedral_decode
 from gridlight.core.field import Field
@@ -12,7 +13,6 @@ from gridlight.core.orientation import inside_solid
 from gridlight.core.patches import POINTS
 from gridlight.core.reference_bake import ReferenceBake
 from gridlight.core.reference_scene import Surfaces
-from gridlight.core.steps import run
 from gridlight.gpu_shaders.backend import GpuBackend
 from gridlight.gpu_shaders.textures import allocate, read, upload
 from shader_runner import read_layers, run
@@ -52,7 +52,7 @@ class Stages:
         self.backend.allocate_field()
         self.gpu = self.backend.surfaces(0, len(nodes))
         self.capture(method)
-        run(self.backend.bind(self.gpu))
+        steps.run(self.backend.bind(self.gpu))
 
     @property
     def light(self):
@@ -107,7 +107,7 @@ class Stages:
         hits = self.hits_texture()
         count = self.gpu.count * 6 * self.settings.face**2
         direct = allocate(count, "test")
-        run(self.light._direct.light(hits, 1, np.flatnonzero(self.hits()[:, 3] >= 0), samples, direct))
+        steps.run(self.light._direct.light(hits, 1, np.flatnonzero(self.hits()[:, 3] >= 0), samples, direct))
         return read(direct, count)[:, :3].reshape(self.gpu.count, -1, 3)
 
     # Patches
@@ -139,12 +139,12 @@ class Stages:
     def direct_of(self, patches, samples):
         """(C, 3) direct light of ``patches`` (C,) by so many samples."""
         direct = allocate(self.light.count, "test")
-        run(self.light._direct.light(upload(self.points, "test"), POINTS, patches, samples, direct))
+        steps.run(self.light._direct.light(upload(self.points, "test"), POINTS, patches, samples, direct))
         return read(direct, self.light.count)[patches, :3].astype(float)
 
     def direct(self):
         """(N, 3) direct light as the bake takes it."""
-        run(self.light.light_new_patches())
+        steps.run(self.light.light_new_patches())
         return read(self.light.direct, self.light.count)[:, :3].astype(float)
 
     def rays(self, first, count, rays_each, segments=1):
@@ -161,8 +161,8 @@ class Stages:
 
     def connect(self):
         """Connections of all patches, among them those that only rays see."""
-        run(self.light.light_new_patches())
-        run(self.light.connect())
+        steps.run(self.light.light_new_patches())
+        steps.run(self.light.connect())
         count, each = self.light.count, self.light._rays_each
         return Connections(
             read(self.light._brought.texture, count)[:, :3].astype(float),
