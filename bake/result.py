@@ -9,6 +9,7 @@ from typing import Protocol
 
 from ..core.errors import InputError
 from ..core.field import Field
+from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..gpu_shaders.scene_textures import SceneTextures
 
@@ -66,6 +67,7 @@ class BakeResult:
     field: Field | None = None
     iterations: int = 0
     converged: bool = False
+    missing: float = 0.0  # estimated share of the light still to come when iterations stopped
     energy: list[float] = default(default_factory=list)
     change: list[float] = default(default_factory=list)
     seconds: dict[str, float] = default(default_factory=dict)
@@ -75,6 +77,8 @@ class BakeResult:
     notes: list[str] = default(default_factory=list)
     warnings: list[str] = default(default_factory=list)
     relit: Relit | None = None
+    settings: BakeSettings | None = None  # that the bake chose by itself, where it was given an error
+    error: dict | None = None  # then: target, predicted error and its parts, see error_driven.py
 
 
 def check_scene(snapshot: SceneSnapshot, result: BakeResult) -> None:

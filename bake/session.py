@@ -30,6 +30,7 @@ from ..core.snapshot import SceneSnapshot
 from ..core.steps import Pace, Steps
 from ..gpu_shaders.backend import GpuBackend
 from ..gpu_shaders.change_pass import new_numbers, probes_reached, resolve_again
+from ..gpu_shaders.scene_textures import SceneTextures
 from .batches import Batches
 from .capture_choice import choose_capture
 from .convergence import MANY_MODES, Convergence
@@ -59,8 +60,10 @@ class BakeSession:
         result: BakeResult | None = None,
         stopwatch: Stopwatch | None = None,
         pace: Pace | None = None,
+        scene: SceneTextures | None = None,
     ):
-        """``pace``: how much is done in a step; without one steps are as large as they come."""
+        """``pace``: how much is done in a step; without one steps are as large as they come. ``scene``: ``snapshot`` on
+        the GPU, from another session of the same grid."""
         self.snapshot = snapshot
         self.grid = grid
         self.settings = settings
@@ -71,6 +74,7 @@ class BakeSession:
         self._stopwatch.seconds = self.result.seconds
         self._pace = pace or Pace(None)
         self.unshown = np.zeros(0, bool)  # (S,): probes whose light has changed since ``show`` was there
+        self._scene = scene
 
     # The bake
     # ------------------------------------------------------------------------------------------------------------------
@@ -87,7 +91,7 @@ class BakeSession:
         self._state = yield from self._stopwatch.steps("cull", self._pace.in_background(self._cull))
         yield
         self._reporter.phase("upload")
-        making = GpuBackend.make(self.snapshot, self.grid, self.settings, self._pace)
+        making = GpuBackend.make(self.snapshot, self.grid, self.settings, self._pace, self._scene)
         self.backend = yield from self._stopwatch.steps("setup", making)
         yield
         result.scene = self.backend.scene
@@ -152,6 +156,24 @@ class BakeSession:
         yield from self._bounce(warm=False)
         self._mark_unshown(emission=self.backend.scene.emitter_count > 0)
 
+    def light_with(self, settings: BakeSettings) -> Steps[None]:
+        """Lights what was baked once more with other ``settings`` of light, its seed among them, in steps: probes stay
+        where they are and see what they saw. ``result`` is a new one."""
+        self.settings = self.backend.settings = settings
+        self.result = BakeResult(scene=self.backend.scene, capture=self.result.capture)
+        self._stopwatch.seconds = self.result.seconds
+        self._batches.unbind()
+        self.backend.forget_patches()
+        self.backend.forget_emission()
+        for index in range(self._batches.count):
+            yield from self._batches.bound(index)
+        yield from self._stopwatch.steps("light", self.backend.light.light_new_patches())
+        yield from self._stopwatch.steps("light", self.backend.light.connect())
+        yield from self._bounce(warm=False)
+        self._mark_unshown(emission=self.backend.scene.emitter_count > 0)
+        yield from self.show()
+        yield from self.finish()
+
     def _bounce(self, warm: bool) -> Steps[None]:
         """Iterates until the light has settled, from the dark or from the light before."""
         convergence = Convergence(self.settings.bounces, self.settings.tolerance)
@@ -170,6 +192,7 @@ class BakeSession:
             yield
         self.result.iterations = convergence.iterations
         self.result.converged = convergence.converged
+        self.result.missing = convergence.missing
         self.result.change = convergence.changes
         self.result.notes.append(convergence.reason)
 

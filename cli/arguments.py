@@ -16,6 +16,7 @@ SIGNED_OPTIONS = (
     "--seed",
     "--frame",
     "--tolerance",
+    "--error",
     "--bounces",
     "--gather",
     "--samples",
@@ -33,6 +34,14 @@ SIGNED_OPTIONS = (
     "--size",
     "--refine",
 )
+
+
+class Given(argparse.Action):
+    """Stores an option's value and notes in ``namespace.given``, a set of names, that it was given."""
+
+    def __call__(self, parser, namespace, values, option_string=None):
+        setattr(namespace, self.dest, values)
+        namespace.given = getattr(namespace, "given", frozenset()) | {self.dest}
 
 
 class Parser(argparse.ArgumentParser):

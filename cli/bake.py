@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..core.error_budget import ErrorGoal
 from ..core.errors import Cancelled, InputError
 from ..core.grid import Grid
 from ..core.settings import CAPTURES, BakeSettings
@@ -30,6 +31,7 @@ def add_arguments(parser, in_blender: bool) -> None:
     volume.add_argument("--max", metavar="X,Y,Z", type=arguments.point, help="the opposite corner")
     volume.add_argument("--resolution", metavar="NX,NY,NZ", type=arguments.counts, help="probes per axis, 1 to 256")
     volume.add_argument("--spacing", metavar="M", type=arguments.length, help="or the distance between probes, metres")
+    add_goal(parser)
     add_settings(parser)
     parser.add_argument("--frame", metavar="N", type=int, help="frame to bake (default: the file's current one)")
     parser.add_argument(
@@ -42,6 +44,17 @@ def add_arguments(parser, in_blender: bool) -> None:
     parser.add_argument("--quiet", action="store_true", help="no progress; warnings stay")
 
 
+def add_goal(parser) -> None:
+    """The option that becomes an ErrorGoal."""
+    parser.add_argument(
+        "--error",
+        metavar="T",
+        type=float,
+        help="relative error of irradiance at probes to aim for, such as 0.02: face size, bands, tolerance and samples "
+        "that are not given are then chosen, the cheapest that meet it",
+    )
+
+
 def add_settings(parser) -> None:
     """The options that become a BakeSettings, with its defaults."""
     standard = BakeSettings()
@@ -50,16 +63,23 @@ def add_settings(parser) -> None:
         "--bands",
         metavar="1..4",
         type=int,
+        action=arguments.Given,
         default=standard.bands,
         help="spherical-harmonic bands; a fourth adds nothing to diffuse light (default %(default)s)",
     )
     group.add_argument(
-        "--face", metavar="N", type=int, default=standard.face, help="texels per cube face edge (default %(default)s)"
+        "--face",
+        metavar="N",
+        type=int,
+        action=arguments.Given,
+        default=standard.face,
+        help="texels per cube face edge (default %(default)s)",
     )
     group.add_argument(
         "--bounces",
         metavar="N|auto",
         type=arguments.bounces,
+        action=arguments.Given,
         default=standard.bounces,
         help="light iterations; auto: until the tolerance is met (default auto)",
     )
@@ -67,6 +87,7 @@ def add_settings(parser) -> None:
         "--tolerance",
         metavar="T",
         type=float,
+        action=arguments.Given,
         default=standard.tolerance,
         help="relative energy still missing when iterations stop (default %(default)s)",
     )
@@ -74,6 +95,7 @@ def add_settings(parser) -> None:
         "--gather",
         metavar="N",
         type=int,
+        action=arguments.Given,
         default=standard.gather,
         help="bounces really traced before the field is read (default %(default)s)",
     )
@@ -81,6 +103,7 @@ def add_settings(parser) -> None:
         "--samples",
         metavar="N",
         type=int,
+        action=arguments.Given,
         default=standard.samples,
         help="shadow samples per texel and soft light (default %(default)s)",
     )
@@ -122,9 +145,15 @@ def settings_from(args) -> BakeSettings:
     )
 
 
+def goal_from(args) -> ErrorGoal | None:
+    """The error that the bake is asked for, if it is. Raises InputError for one out of range."""
+    return None if args.error is None else ErrorGoal(args.error, getattr(args, "given", frozenset()))
+
+
 def check(args) -> None:
     """What can be refused before Blender starts."""
     settings_from(args)
+    goal_from(args)
     if (args.min is None) != (args.max is None):
         raise InputError("--min and --max belong together; give both or neither")
     if args.resolution and args.spacing:
@@ -172,7 +201,9 @@ def run(args, reporter, should_stop):
         pipeline.start_gpu(reporter, stopwatch)
         edits = [edits_of(scene, grid) for grid in grids]
         kept: list | None = [] if args.relight else None
-        results = pipeline.bake_volumes(snapshot, grids, settings, reporter, should_stop, stopwatch, edits, kept)
+        results = pipeline.bake_volumes(
+            snapshot, grids, settings, reporter, should_stop, stopwatch, edits, kept, goal_from(args)
+        )
         title = Path(args.file or bpy.data.filepath or scene.name).name
         summary, status = pipeline.write_results(
             title, snapshot, settings, results, folder, reporter, should_stop, stopwatch

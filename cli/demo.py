@@ -13,6 +13,7 @@ NEEDS_BLENDER = NEEDS_GPU = True
 
 def add_arguments(parser, in_blender: bool) -> None:
     parser.add_argument("-o", "--output", metavar="DIR", required=True, help="folder for the results")
+    bake.add_goal(parser)
     bake.add_settings(parser)
     parser.add_argument("--quiet", action="store_true", help="no progress; warnings stay")
 
@@ -20,6 +21,7 @@ def add_arguments(parser, in_blender: bool) -> None:
 def check(args) -> None:
     """What can be refused before Blender starts."""
     bake.settings_from(args)
+    bake.goal_from(args)
 
 
 def run(args, reporter, should_stop):
@@ -43,7 +45,9 @@ def run(args, reporter, should_stop):
         pipeline.check_snapshot(snapshot, reporter)
         grids = [Grid(volume.matrix, volume.resolution, volume.name) for volume in snapshot.volumes]
         pipeline.start_gpu(reporter, stopwatch)
-        results = pipeline.bake_volumes(snapshot, grids, settings, reporter, should_stop, stopwatch)
+        results = pipeline.bake_volumes(
+            snapshot, grids, settings, reporter, should_stop, stopwatch, goal=bake.goal_from(args)
+        )
         with stopwatch.measure("write"):
             for volume, result in zip(snapshot.volumes, results):
                 place_probes(scene, result.field.grid, result.field.state, bpy.data.objects.get(volume.name))

@@ -9,11 +9,13 @@ from contextlib import contextmanager
 import bpy
 import numpy as np
 
+from ..bake.error_driven import ErrorDrivenBake
 from ..bake.job import drive
 from ..bake.preview import write_previews
 from ..bake.result import BakeResult
 from ..bake.session import BakeSession
 from ..core.conventions import ACTIVE, CULLED, INVALID
+from ..core.error_budget import ErrorGoal
 from ..core.errors import InputError
 from ..core.grid import Grid
 from ..core.probe_edits import ProbeEdits
@@ -80,20 +82,27 @@ def bake_volumes(
     stopwatch: Stopwatch,
     edits: list[ProbeEdits | None] | None = None,
     kept: list[BakeSession] | None = None,
+    goal: ErrorGoal | None = None,
 ) -> list[BakeResult]:
-    """Bakes ``grids`` one after the other, each with its ``edits``. Appends the sessions to ``kept``, which keeps them
-    on the GPU."""
+    """Bakes ``grids`` one after the other, each with its ``edits``, with ``settings`` or as the ``goal`` asks. Appends
+    the sessions to ``kept``, which keeps them on the GPU."""
     for grid in grids:
         probe_file.check_size(grid, settings.bands)
     results = []
     for grid, edit in zip(grids, edits or [None] * len(grids)):
         if len(grids) > 1:
             reporter.note(f"volume '{grid.name}'")
-        session = BakeSession(snapshot, grid, settings, reporter, edit)
-        drive(session.bake(), should_stop)
-        stopwatch.add(session.result.seconds)
-        report_on(session.result, grid, settings, reporter)
-        results.append(session.result)
+        if goal is None:
+            session = BakeSession(snapshot, grid, settings, reporter, edit)
+            drive(session.bake(), should_stop)
+        else:
+            driven = ErrorDrivenBake(snapshot, grid, settings, goal, reporter, edit)
+            drive(driven.bake(), should_stop)
+            session = driven.session
+        result = session.result
+        stopwatch.add(result.seconds)
+        report_on(result, grid, settings, reporter)
+        results.append(result)
         if kept is not None:
             kept.append(session)
     return results
@@ -134,8 +143,14 @@ def write_results(
             result.field.metadata = {
                 **result.field.metadata,
                 **probe_metadata.provenance(
-                    snapshot, settings, device, result.iterations, result.converged, reporter.warnings
+                    snapshot,
+                    result.settings or settings,
+                    device,
+                    result.iterations,
+                    result.converged,
+                    reporter.warnings,
                 ),
+                **({"error": result.error} if result.error else {}),
             }
             probe_file.write(folder.path(f"probes{name}.exr"), result.field)
         reporter.phase("pictures", len(results))
@@ -151,7 +166,7 @@ def write_results(
     summary = _summary(results, device, settings, stopwatch, reporter)
     report = ReportData(
         title=title,
-        settings=settings.as_dict(),
+        settings=summary["settings"],
         device=device,
         blender=bpy.app.version_string,
         generator=f"Gridlight {probe_metadata.program_version()}",
@@ -169,6 +184,7 @@ def write_results(
                 result.iterations,
                 result.converged,
                 result.notes,
+                result.error,
             )
             for result in results
         ],
@@ -186,7 +202,9 @@ def _unsettled(result: BakeResult, settings: BakeSettings) -> bool:
 def _summary(results, device: str, settings: BakeSettings, stopwatch: Stopwatch, reporter) -> dict:
     states = np.concatenate([result.field.state for result in results])
     lit = np.concatenate([result.field.coefficients[result.field.state == ACTIVE] for result in results])
+    chosen = [result.settings or settings for result in results]
     return {
+        **({"error": _worst_error(results)} if any(result.error for result in results) else {}),
         "probes": {
             "total": len(states),
             "active": int((states == ACTIVE).sum()),
@@ -198,7 +216,14 @@ def _summary(results, device: str, settings: BakeSettings, stopwatch: Stopwatch,
         "ringing": ringing(lit).as_dict(),
         "seconds": stopwatch.totals(),
         "device": device,
-        "settings": settings.as_dict(),
+        "settings": chosen[0].as_dict() if len(chosen) == 1 else settings.as_dict(),
         "files": [],
         "warnings": reporter.warnings,
     }
+
+
+def _worst_error(results: list[BakeResult]) -> dict:
+    """What error-driven bakes predict: of the volume that is furthest off, and of each where there are several."""
+    volumes = [{"volume": result.field.grid.name, **result.error} for result in results]
+    worst = max(volumes, key=lambda error: np.inf if error["predicted"] is None else error["predicted"])
+    return {**worst, "volumes": volumes} if len(volumes) > 1 else results[0].error

@@ -122,6 +122,7 @@ def run(args, reporter, should_stop):
             "samples": args.spp,
             "seeds": 2,
         },
+        "prediction": against_prediction(rows, field),
         "seed": args.seed,
         "seconds": {"total": round(time.perf_counter() - started, 6)},
         "files": [str(folder.folder / name)],
@@ -137,9 +138,11 @@ def choose_points(field: Field, space: verify_points.FreeSpace, count: int, seed
         InputError: no active probe stands in free space.
     """
     random = np.random.default_rng(seed)
-    nodes = (field.grid.positions() + field.offset)[field.state == ACTIVE]
+    nodes = np.flatnonzero(field.state == ACTIVE)
     nodes = nodes[random.permutation(len(nodes))[: max(4 * count, 64)]]
-    nodes = nodes[space.is_free(nodes)][:count]
+    positions = (field.grid.positions() + field.offset)[nodes]
+    free = space.is_free(positions)
+    nodes, positions = nodes[free][:count], positions[free][:count]
     if not len(nodes):
         raise InputError(
             f"{field.grid.name}: none of its active probes stands in free space of this scene; "
@@ -149,7 +152,7 @@ def choose_points(field: Field, space: verify_points.FreeSpace, count: int, seed
     surface, normals = verify_points.surface_points(space, field.grid, count, seed)
     six = verify_points.SIX_NORMALS
     kinds = [
-        Points("probes", nodes, np.broadcast_to(six, (len(nodes), *six.shape))),
+        Points("probes", positions, np.broadcast_to(six, (len(nodes), *six.shape)), nodes),
         Points("free points", free, np.broadcast_to(six, (len(free), *six.shape))),
     ]
     if len(surface):
@@ -198,7 +201,32 @@ def table(rows: list[Row], field: Field, engine: str) -> str:
                 f"{_percent(row.negative.lowest)}; perfect probes would have {row.negative_floor.count}, lowest "
                 f"{_percent(row.negative_floor.lowest)}"
             )
+    predicted = against_prediction(rows, field)
+    if predicted:
+        target, told, most, found = (_percent(predicted[key]) for key in ("target", "predicted", "at_most", "verified"))
+        lines.append(f"probes: {found} verified, {told} predicted by the bake (at most {most}), {target} asked for")
+        if predicted["between"] is not None:
+            lines.append(
+                f"free points: {_percent(predicted['between_verified'])} verified, "
+                f"{_percent(predicted['between'])} predicted by the bake"
+            )
     return "\n".join(lines)
+
+
+def against_prediction(rows: list[Row], field: Field) -> dict | None:
+    """What a bake that was given an error predicted, beside what was found; None for other bakes."""
+    error = field.metadata.get("error")
+    if not isinstance(error, dict) or error.get("predicted") is None:
+        return None
+    verified = {row.points.name: row.error.relative_rms for row in rows}
+    return {
+        "target": error["target"],
+        "predicted": error["predicted"],
+        "at_most": error["predicted_at_most"],
+        "verified": verified["probes"],
+        "between": error.get("between"),
+        "between_verified": verified["free points"],
+    }
 
 
 def _percent(value: float, signed: bool = False) -> str:

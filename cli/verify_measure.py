@@ -26,12 +26,14 @@ _NODE_SEED = 2_000_003
 class Points:
     """Points of one kind; every point is asked for K irradiances.
 
-    ``normals`` is (N, K, 3): six axes in free space, its own normal for a point on a surface.
+    ``normals`` is (N, K, 3): six axes in free space, its own normal for a point on a surface. Points with ``nodes`` are
+    probes that stand there and are asked what they hold; at others the file's lookup is asked.
     """
 
     name: str
     positions: np.ndarray  # (N, 3) world metres
     normals: np.ndarray
+    nodes: np.ndarray | None = None  # (N,) grid indices
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class Row:
     """What was found at points of one kind. Irradiances are (N, K, 3)."""
 
     points: Points
-    measured: np.ndarray  # by the probe file's lookup
+    measured: np.ndarray  # by the probes or by the probe file's lookup
     reference: np.ndarray
     error: measures.ErrorFigures
     floor: measures.ErrorFigures  # of a perfect probe with the file's bands, standing at the point itself
@@ -127,8 +129,11 @@ def _compare(field: Field, kind: Points, first: np.ndarray, second: np.ndarray, 
             f"{kind.name}: Cycles sees no light at any of them; give the scene light before it is verified"
         )
     count = kind.normals.shape[1]
-    measured = lookup.irradiance(field, np.repeat(kind.positions, count, axis=0), kind.normals.reshape(-1, 3))
-    measured = measured.reshape(reference.shape)
+    if kind.nodes is not None:
+        measured = sh.irradiance(field.coefficients[kind.nodes].astype(float)[:, None], kind.normals)
+    else:
+        measured = lookup.irradiance(field, np.repeat(kind.positions, count, axis=0), kind.normals.reshape(-1, 3))
+        measured = measured.reshape(reference.shape)
     standing_there = np.stack([project_panorama((a + b) / 2, field.bands) for a, b in zip(first, second)])
     floor = sh.irradiance(standing_there[:, None], kind.normals)
     error = measures.compare(measured, reference)

@@ -41,6 +41,7 @@ class VolumeReport:
     iterations: int = 0
     converged: bool = True
     notes: list[str] = default(default_factory=list)
+    error: dict | None = None  # of a bake that was given a target, see bake/error_driven.py
 
 
 @dataclass
@@ -181,7 +182,7 @@ def _volumes(report: ReportData) -> str:
         parts.append(
             f"<section><h2>{escape(name)}</h2><p>{shape} probes, cells of {cell} m, "
             f"{bands} {'band' if bands == 1 else 'bands'} of spherical harmonics.</p>"
-            f"{_settling(volume, report.settings)}"
+            f"{_predicted(volume)}{_settling(volume, report.settings)}"
             f'<h2>The field, level by level</h2><div class="box">{slices_html(volume.field, f"volume{index}")}</div>'
             f'<div class="pair" style="margin-top:16px"><div class="box"><h3>How bright the probes are</h3>'
             f"{figures.histogram(_mean_irradiance(volume.field), 'Histogram of irradiance', 'W/m²')}"
@@ -189,6 +190,30 @@ def _volumes(report: ReportData) -> str:
             f'<div class="box"><h3>Numbers</h3>{_numbers(volume.field)}</div></div></section>'
         )
     return "\n".join(parts)
+
+
+def _predicted(volume: VolumeReport) -> str:
+    """What a bake that was given a target says of its error."""
+    error = volume.error
+    if not error:
+        return ""
+    if error["predicted"] is None:
+        return f'<div class="box"><h3>Error at probes</h3><p>Not estimated: {escape(error["reason"])}.</p></div>'
+    outcome = "met" if error["met"] else f"not reached, stopped by {error['stopped']}"
+    rows = {
+        f"target, {outcome}": error["target"],
+        "predicted at probes": error["predicted"],
+        "at most, as sure as the estimate is": error["predicted_at_most"],
+        "between probes, not covered by the target": error["between"],
+    }
+    rows |= {f"part: {name}": value for name, value in error["parts"].items()}
+    table = {name: "unknown" if value is None else f"{100 * value:.2f} %" for name, value in rows.items()}
+    kept = ", ".join(f"{count} with {bands}" for bands, count in error["bands"].items() if count)
+    return (
+        f'<div class="box"><h3>Error at probes</h3>{_table(table)}<p class="legend">Relative RMS of irradiance against '
+        f"{error['paths']} paths; its parts add up as squares. Bands that probes keep: {kept}.</p>"
+        f"{_list(error['passes'])}</div>"
+    )
 
 
 def _settling(volume: VolumeReport, settings: dict) -> str:

@@ -102,8 +102,17 @@ class GpuBackend:
         self._raster: RasterCapture | None = None
 
     @classmethod
-    def make(cls, snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, pace: Pace) -> Steps[GpuBackend]:
+    def make(
+        cls,
+        snapshot: SceneSnapshot,
+        grid: Grid,
+        settings: BakeSettings,
+        pace: Pace,
+        scene: SceneTextures | None = None,
+    ) -> Steps[GpuBackend]:
         """The same in steps."""
+        if scene is not None:
+            return cls(snapshot, grid, settings, scene, pace)
         density = yield from pace.in_background(sampling_density, snapshot, grid)
         scene = yield from SceneTextures.make(snapshot, grid.center, density, pace)
         return cls(snapshot, grid, settings, scene, pace)

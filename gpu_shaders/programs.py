@@ -16,6 +16,7 @@ from . import (
     live_create_infos,
     measure_create_infos,
     patch_create_infos,
+    reference_create_infos,
     relight_create_infos,
     viewport_create_infos,
 )
@@ -26,6 +27,7 @@ _BINDINGS = (
     live_create_infos,
     measure_create_infos,
     patch_create_infos,
+    reference_create_infos,
     relight_create_infos,
     viewport_create_infos,
 )

@@ -17,6 +17,7 @@ _TITLES = {
     "light": "Bouncing light",
     "project": "Collecting light",
     "gather": "Gathering",
+    "error": "Checking the error",
 }
 _TYPICAL_ITERATIONS = 8  # until light has settled; only the bar's speed hangs on it
 _LEAST_SECONDS, _LEAST_SHARE = 1.0, 0.05  # before a guess of the time left is worth reading

@@ -13,6 +13,7 @@ from collections.abc import Generator, Iterator
 import bpy
 
 from ..bake.result import BakeResult
+from ..core.error_budget import ErrorGoal
 from ..core.errors import Cancelled, InputError
 from ..core.grid import Grid
 from ..core.probe_edits import ProbeEdits
@@ -47,6 +48,7 @@ class BakeTask:
         """``relight``: go on from bakes that were kept, where they fit; others are baked from nothing."""
         self._relight = relight
         self.settings: BakeSettings = scene.gridlight.bake_settings()
+        self._goal: ErrorGoal | None = scene.gridlight.error_goal()
         self.progress = Progress(len(volumes), self.settings)
         self.outcome = ""
         self.longest_steps: dict[str, float] = {}  # seconds, by the phase in which the step began
@@ -126,8 +128,10 @@ class BakeTask:
         metadata = []
         for result in results:
             warnings = [*self.progress.warnings, *result.warnings]
-            told = snapshot, self.settings, device, result.iterations, result.converged, warnings
+            told = snapshot, result.settings or self.settings, device, result.iterations, result.converged, warnings
             metadata.append((yield from self._pace.in_background(provenance, *told)))
+            if result.error:
+                metadata[-1]["error"] = result.error
         for volume, result, about in zip(self._find_volumes(), results, metadata):
             self._store(volume, result, about, shown, quality)
         kept_bakes.keep(dict(zip(self._volumes, bakes)))
@@ -137,13 +141,13 @@ class BakeTask:
     ) -> Generator[None, None, KeptBake]:
         """One volume; returns its bake."""
         kept = kept_bakes.take(uid)  # a bake from nothing wants the memory of the one before
-        if self._relight and kept is not None and kept.fits(grid, self.settings, edits):
+        if self._relight and self._goal is None and kept is not None and kept.fits(grid, self.settings, edits):
             kept.relay.target = self.progress
             yield from kept.session.relight(snapshot)
             return kept
         del kept
-        fresh = KeptBake(grid, self.settings, edits, self.progress, snapshot)
-        yield from fresh.session.bake()
+        fresh = KeptBake(grid, self.settings, edits, self.progress, snapshot, self._goal)
+        yield from fresh.bake()
         return fresh
 
     def _find_volumes(self) -> list[bpy.types.Object]:
@@ -184,6 +188,9 @@ def _in_words(results: list[BakeResult], seconds: float) -> str:
     bounces = max(max(result.iterations for result in results) - 1, 0)
     done = "relit" if all(result.relit for result in results) else "baked"
     text = f"{active} probes {done} in {seconds:.1f} s, light bounced {bounces} times"
+    predicted = [result.error["predicted"] for result in results if result.error]
+    if predicted and None not in predicted:
+        text += f", {100 * max(predicted):.1f} % error at probes by its own estimate"
     if not all(result.converged for result in results):
         text += ", some of it is still missing"
     return text

@@ -10,12 +10,15 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
+from ..bake.error_driven import ErrorDrivenBake
 from ..bake.result import Reporter
 from ..bake.session import BakeSession
+from ..core.error_budget import ErrorGoal
 from ..core.grid import Grid
 from ..core.probe_edits import ProbeEdits
 from ..core.settings import BakeSettings
-from ..core.steps import STEP_SECONDS, Pace
+from ..core.snapshot import SceneSnapshot
+from ..core.steps import STEP_SECONDS, Pace, Steps
 from ..gpu_shaders.textures import wait_for_gpu
 
 
@@ -41,17 +44,36 @@ class Relay:
 class KeptBake:
     """A session with what must still hold for it to be relit."""
 
-    def __init__(self, grid: Grid, settings: BakeSettings, edits: ProbeEdits | None, reporter: Reporter, snapshot):
+    def __init__(
+        self,
+        grid: Grid,
+        settings: BakeSettings,
+        edits: ProbeEdits | None,
+        reporter: Reporter,
+        snapshot: SceneSnapshot,
+        goal: ErrorGoal | None = None,
+    ):
         self.relay = Relay(reporter)
         pace = Pace(STEP_SECONDS, wait_for_gpu)
         self.session = BakeSession(snapshot, grid, settings, self.relay, edits, pace=pace)
+        self._driven = ErrorDrivenBake(snapshot, grid, settings, goal, self.relay, edits, pace=pace) if goal else None
         self._grid, self._settings, self._edits = grid, settings, edits or ProbeEdits.none(grid)
 
+    def bake(self) -> Steps[None]:
+        """The bake in steps; ``session`` has it afterwards."""
+        if self._driven is None:
+            yield from self.session.bake()
+        else:
+            yield from self._driven.bake()
+            self.session = self._driven.session
+
     def fits(self, grid: Grid, settings: BakeSettings, edits: ProbeEdits | None) -> bool:
-        """Whether a relight gives what a bake of ``grid`` with these settings and edits would."""
+        """Whether a relight gives what a bake of ``grid`` with these settings and edits would. Never where an error was
+        asked for: a relight does not look after it."""
         edits = edits or ProbeEdits.none(grid)
         return (
-            settings == self._settings
+            self._driven is None
+            and settings == self._settings
             and tuple(grid.resolution) == tuple(self._grid.resolution)
             and np.array_equal(grid.matrix, self._grid.matrix)
             and np.array_equal(edits.disabled, self._edits.disabled)

@@ -14,6 +14,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from ..core.error_budget import LEAST_TARGET, MOST_TARGET, ErrorGoal
 from ..core.settings import FACE_SIZES, BakeSettings
 from .export_targets import TARGET_ITEMS
 from .object_properties import GridlightLight, GridlightVolume
@@ -181,6 +182,24 @@ class GridlightSettings(bpy.types.PropertyGroup):
         set=_set_quality,
         options=set(),
     )
+    use_error: BoolProperty(
+        name="Target Error",
+        description="Ask for an error instead of settings: face size, samples, tolerance and bands are then chosen",
+        options=set(),
+    )
+    target_error: FloatProperty(
+        name="Target Error",
+        description="Error of the light at probes to aim for, as a share of it: 0.02 is 2 %. The bake starts cheap, "
+        "checks itself by paths of light, refines until the target is met, and says what it reached",
+        default=0.02,
+        min=LEAST_TARGET,
+        max=MOST_TARGET,
+        soft_min=0.005,
+        soft_max=0.2,
+        step=1,
+        precision=3,
+        options=set(),
+    )
     custom: BoolProperty(description="Custom was chosen although the settings equal a preset", options={"HIDDEN"})
     bands: IntProperty(
         name="Bands",
@@ -283,6 +302,14 @@ class GridlightSettings(bpy.types.PropertyGroup):
     preview: PointerProperty(type=GridlightPreview)
     export: PointerProperty(type=GridlightExport)
     active_light: IntProperty(name="Light", description="Light that is chosen in the list", options={"HIDDEN"})
+
+    def error_goal(self) -> ErrorGoal | None:
+        """The error that bakes aim for, if one is asked for. Fewer or more bands than usual are then the user's own
+        choice."""
+        if not self.use_error:
+            return None
+        kept = {"bands"} if self.bands != _STANDARD.bands else set()
+        return ErrorGoal(float(f"{self.target_error:.6g}"), frozenset(kept))
 
     def bake_settings(self) -> BakeSettings:
         """The validated settings of a bake: the one place where they are made from what the user set.

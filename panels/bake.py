@@ -23,13 +23,19 @@ class GRIDLIGHT_PT_bake(SidebarPanel, bpy.types.Panel):
         settings = context.scene.gridlight
         layout.row(align=True).prop(settings, "quality", expand=True)
         quality = QUALITIES.get(settings.quality)
+        row = layout.row(align=True)
+        row.prop(settings, "use_error", text="")
+        target = row.row(align=True)
+        target.active = settings.use_error
+        target.prop(settings, "target_error")
         row = layout.row()
         row.active = False
-        row.label(
-            text=f"{quality.error_percent:.1f} % from path tracing in the gallery"
-            if quality
-            else "Error not measured in advance"
-        )
+        if settings.use_error:
+            row.label(text="Settings are chosen for this error")
+        elif quality:
+            row.label(text=f"{quality.error_percent:.1f} % from path tracing in the gallery")
+        else:
+            row.label(text="Error not measured in advance")
         row = layout.row(align=True)
         row.scale_y = 1.5
         task = running_task()

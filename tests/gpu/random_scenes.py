@@ -116,7 +116,7 @@ def _lamp(kind, random):
 
 
 def _grid(kind, random):
-    resolution = tuple(int(count) for count in random.integers(2, 4, 3))
+    resolution = tuple(int(count) for count in np.where(random.random(3) < 0.25, 3, 2))
     reach = {"on the walls": 1.0, "into the walls": 1.05, "beyond": 1.4}.get(kind, 0.85)
     matrix = np.diag([*(reach * ROOM), 1.0])
     if kind == "turned":

@@ -7,21 +7,21 @@ another.
 """
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
 from gridlight.core.grid import Grid
 from gridlight.core.settings import BakeSettings
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import HealthCheck, Phase, given, seed, settings
 from random_scenes import Spec, specs
 from small_scenes import AXES, bake, irradiance_at_nodes, moved
 
-SETTINGS = BakeSettings(face=6, bounces=3, capture="trace")
-# Derandomised: the scenes of a run are always the same ones, so a failure can be met again anywhere.
-many = settings(
-    max_examples=500, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck), database=None
-)
-few = settings(many, max_examples=4, phases=[Phase.generate])
+SETTINGS = BakeSettings(face=4, bounces=3, capture="trace")
+PIECES, SCENES_EACH = 20, 25
+MOST_TURNED, USUALLY_TURNED = 0.5, 0.06  # share of the light that a quarter turn changes: in one scene, the median
+# Seeds are given: the scenes of a run are always the same ones, so a failure can be met again anywhere.
+some = settings(deadline=None, suppress_health_check=list(HealthCheck), database=None, phases=[Phase.generate])
 
 # Scenes that failed once.
 KEPT = [
@@ -49,10 +49,17 @@ def scaled(snapshot, factor):
     )
 
 
-def check_finite_and_the_same_again(spec):
+@lru_cache(maxsize=1)
+def as_it_is(spec):
+    """(snapshot, grid, result) of the scene without any change, which most checks start from."""
     snapshot, grid = spec.build()
-    first, second = bake(snapshot, grid, SETTINGS), bake(snapshot, grid, SETTINGS)
-    for name in ("coefficients", "state", "validity", "offset", "depth"):
+    return snapshot, grid, bake(snapshot, grid, SETTINGS)
+
+
+def check_finite_and_the_same_again(spec):
+    snapshot, grid, first = as_it_is(spec)
+    second = bake(snapshot, grid, SETTINGS)
+    for name in ("coefficients", "gradient", "state", "validity", "offset", "depth"):
         values = getattr(first.field, name)
         assert np.isfinite(values).all(), name
         assert values.tobytes() == getattr(second.field, name).tobytes(), name
@@ -61,15 +68,15 @@ def check_finite_and_the_same_again(spec):
 
 def check_scale(spec, factor=32.0):
     """A power of two, so that rounding leaves every choice of samples as it is."""
-    snapshot, grid = spec.build()
-    one, many = (fields_of(bake(s, grid, SETTINGS)) for s in (snapshot, scaled(snapshot, factor)))
+    snapshot, grid, base = as_it_is(spec)
+    one, many = fields_of(base), fields_of(bake(scaled(snapshot, factor), grid, SETTINGS))
     np.testing.assert_allclose(many, factor * one, rtol=1e-5, atol=1e-6 * factor * np.abs(one).max())
 
 
 def check_sum(spec):
     """The sources split in two unequal parts, each lamp in its own ratio. None is dark in either: what is inside a
     solid is judged by where it is light, and must not differ."""
-    snapshot, grid = spec.build()
+    snapshot, grid, base = as_it_is(spec)
     share = np.random.default_rng(spec.seed).uniform(0.1, 0.9, len(snapshot.lights))
     parts = []
     for shares, rest in ((share, 0.3), (1 - share, 0.7)):
@@ -78,44 +85,47 @@ def check_sum(spec):
             replace(light, color=tuple(float(s) * c for c in light.color)) for light, s in zip(snapshot.lights, shares)
         ]
         parts.append(replace(part, lights=lamps))
-    whole, *parts = (bake(part, grid, SETTINGS).field for part in (snapshot, *parts))
+    whole, parts = base.field, [bake(part, grid, SETTINGS).field for part in parts]
     for part in parts:
         np.testing.assert_array_equal(part.state, whole.state)
         np.testing.assert_array_equal(part.offset, whole.offset)
     total = sum(part.coefficients.astype(float) for part in parts)
-    np.testing.assert_allclose(total, whole.coefficients, atol=5e-3 * np.abs(total).max())
+    # Patches get more samples of a lamp where it is uneven beside all light there is: other noise, not other light.
+    np.testing.assert_allclose(total, whole.coefficients, atol=3e-2 * np.abs(total).max())
+    assert np.sqrt(((total - whole.coefficients) ** 2).sum() / max((total**2).sum(), 1e-30)) <= 1e-2
 
 
 def check_turn(spec):
-    """Quarter turns map texels on texels; patches and their rays lie elsewhere after one, which leaves chance."""
+    """The field turns with the scene, up to chance: cubes of probes stand askew, so after a quarter turn texels,
+    patches and rays all lie elsewhere. Returns by how much it does not, which over many scenes has to be little."""
     if spec.volume == "on the walls":
-        return
+        return None
     snapshot, grid = spec.build()
     points = [light if light.kind != "AREA" else replace(light, kind="POINT") for light in snapshot.lights]
     matt = [replace(material, emission=(0.0, 0.0, 0.0)) for material in snapshot.materials]
     snapshot = replace(snapshot, lights=points, materials=matt)
     turn = np.eye(4)[[1, 2, 0, 3] if spec.seed % 2 else [1, 0, 2, 3]]
     turn[:3, 1] *= np.linalg.det(turn)
-    there = moved(snapshot, turn), Grid(turn @ grid.matrix, grid.resolution)
-    for bounces, tolerance in ((0, 0.05), (3, 0.1 if spec.volume == "inside" else 0.25)):
-        choice = replace(SETTINGS, bounces=bounces)
-        straight, turned = bake(snapshot, grid, choice), bake(*there, choice)
-        if straight.field.offset.any() or turned.field.offset.any():
-            return  # which of two ways out of a wall is the shorter one may be up to rounding
-        np.testing.assert_array_equal(turned.field.state, straight.field.state)
-        expected = irradiance_at_nodes(straight.field)
-        found = irradiance_at_nodes(turned.field, AXES @ turn[:3, :3].T)
-        rms = np.sqrt(((found - expected) ** 2).mean())
-        assert rms <= tolerance * np.sqrt((expected**2).mean())
+    choice = replace(SETTINGS, face=8)
+    straight = bake(snapshot, grid, choice).field
+    turned = bake(moved(snapshot, turn), Grid(turn @ grid.matrix, grid.resolution), choice).field
+    if straight.offset.any() or turned.offset.any():
+        return None  # which of two ways out of a wall is the shorter one may be up to rounding
+    np.testing.assert_array_equal(turned.state, straight.state)
+    expected = irradiance_at_nodes(straight)
+    found = irradiance_at_nodes(turned, AXES @ turn[:3, :3].T)
+    error = float(np.sqrt(((found - expected) ** 2).sum() / max((expected**2).sum(), 1e-30)))
+    assert error <= MOST_TURNED
+    return error
 
 
 def check_paint(spec):
     """One material brighter: no probe gets less light."""
-    snapshot, grid = spec.build()
+    snapshot, grid, before = as_it_is(spec)
     index = spec.seed % len(snapshot.materials)
     painted = list(snapshot.materials)
     painted[index] = replace(painted[index], base_color=tuple(0.5 + 0.5 * c for c in painted[index].base_color))
-    before, after = bake(snapshot, grid, SETTINGS), bake(replace(snapshot, materials=painted), grid, SETTINGS)
+    after = bake(replace(snapshot, materials=painted), grid, SETTINGS)
     np.testing.assert_array_equal(before.field.state, after.field.state)
     mean = fields_of(before)[:, 0]
     lost = mean - fields_of(after)[:, 0]
@@ -136,6 +146,38 @@ def check_bound(spec):
     assert mean.min() >= -1e-6 * limit
 
 
+def check_place_and_size(spec):
+    """A hundred kilometres away and a hundredth the size: the same light, to half a percent."""
+    snapshot, grid, base = as_it_is(spec)
+    here = base.field
+    # A probe in the very plane of a wall that nothing moved away looks past it to either side, by rounding.
+    clear = here.offset.any(axis=1) if spec.volume == "on the walls" else np.ones(grid.count, bool)
+    far, small = np.eye(4), np.diag([0.01, 0.01, 0.01, 1.0])
+    far[:3, 3] = 1e5, -7e4, 3e4
+    for matrix in (far, small):
+        there = moved(snapshot, matrix)
+        there = bake(dimmed(there, matrix), Grid(matrix @ grid.matrix, grid.resolution), SETTINGS).field
+        np.testing.assert_array_equal(there.state[clear], here.state[clear])
+        expected = here.coefficients[clear].astype(float)
+        rms = np.sqrt(((there.coefficients[clear] - expected) ** 2).sum() / max((expected**2).sum(), 1e-30))
+        assert rms <= 5e-3, rms
+
+
+def dimmed(snapshot, matrix):
+    """``snapshot``, which was scaled by ``matrix``, with lamps that light it as before: the radiance of areas and the
+    irradiance by suns stay, the intensity of points goes with the square of lengths."""
+    squared = float(np.cbrt(np.linalg.det(matrix[:3, :3]))) ** 2
+    length = np.sqrt(squared)
+    lights = []
+    for light in snapshot.lights:
+        if light.kind == "AREA":
+            light = replace(light, size_x=light.size_x * length, size_y=light.size_y * length)
+        elif light.kind != "SUN":
+            light = replace(light, color=tuple(squared * c for c in light.color))
+        lights.append(light)
+    return replace(snapshot, lights=lights)
+
+
 CHECKS = {
     "finite and the same again": check_finite_and_the_same_again,
     "sources times k": check_scale,
@@ -143,22 +185,42 @@ CHECKS = {
     "quarter turn": check_turn,
     "a brighter wall": check_paint,
     "no brighter than its sources": check_bound,
+    "elsewhere and smaller": check_place_and_size,
 }
 
 
 @pytest.mark.parametrize("check", CHECKS)
-@few
+@settings(some, max_examples=2)
+@seed(0)
 @given(spec=specs())
 def test_invariant(check, spec):
     CHECKS[check](spec)
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("check", CHECKS)
-@many
-@given(spec=specs())
-def test_invariant_on_hundreds_of_scenes(check, spec):
-    CHECKS[check](spec)
+@pytest.mark.parametrize("piece", range(PIECES))
+def test_invariants_on_five_hundred_scenes(piece):
+    broken, seen, turned = [], set(), []
+
+    @settings(some, max_examples=SCENES_EACH)
+    @seed(1000 + piece)
+    @given(spec=specs())
+    def look(spec):
+        seen.add(spec)
+        for name, check in CHECKS.items():
+            try:
+                found = check(spec)
+            except AssertionError as error:
+                broken.append((name, spec, *str(error).strip().splitlines()[:4]))
+            else:
+                if name == "quarter turn" and found is not None:
+                    turned.append(found)
+
+    look()
+    assert len(seen) == SCENES_EACH
+    print(f"turned by a quarter, {len(turned)} scenes: median {np.median(turned):.3f}, most {max(turned):.3f}")
+    assert not broken, "\n".join(map(str, broken))
+    assert np.median(turned) <= USUALLY_TURNED
 
 
 @pytest.mark.parametrize("check, spec", KEPT, ids=str)

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from gridlight.core import lookup
 from gridlight.core.conventions import CULLED
 from gridlight.core.error_estimate import interpolation_error
 from gridlight.core.field import Field
@@ -31,6 +32,41 @@ def test_quadratic_light_has_the_error_in_the_middle_of_a_cell():
     first = np.flatnonzero((nodes[:, 0] < 8) & (nodes[:, 1] < 4) & (nodes[:, 2] < 3))
     expected = a * h * h / 8 / ((light[first] + light[first + 1]) / 2)
     np.testing.assert_allclose(error[first], expected, rtol=2e-3)
+
+
+def with_gradient(light, slope):
+    """A field whose band 0 is ``light`` of the positions, and knows its ``slope`` (P, 3)."""
+    field = field_of(light)
+    field.gradient[:, :, 0] = slope(field.grid.positions())[..., None]
+    return field
+
+
+def test_quadratic_light_whose_gradient_is_known_is_followed_without_error():
+    field = with_gradient(
+        lambda p: 9.0 + p[:, 0] ** 2 - p[:, 1] * p[:, 0],
+        lambda p: np.stack([2 * p[:, 0] - p[:, 1], -p[:, 0], 0 * p[:, 0]], axis=1),
+    )
+    assert interpolation_error(field).max() < 1e-5
+
+
+def test_cubic_light_is_wrong_by_as_much_as_its_third_derivative_says():
+    """The estimate is a share of D = h³/12 · f‴ everywhere, and no less than what the lookup gets wrong."""
+    a, c, h = 0.3, 50.0, 0.5
+    field = with_gradient(
+        lambda p: c + a * p[:, 0] ** 3, lambda p: np.stack([3 * a * p[:, 0] ** 2, 0 * p[:, 0], 0 * p[:, 0]], axis=1)
+    )
+    estimate = interpolation_error(field)
+    light = field.coefficients[:, 0, 0].astype(float)
+    inner = field.grid.lattice()[:, 0] < 8
+    expected = 6 * a * h**3 / 12 / ((light[:-1] + light[1:]) / 2)
+    ratio = (estimate[:-1] / expected)[inner[:-1]]
+    assert ratio.std() < 0.01 * ratio.mean()
+    random = np.random.default_rng(0)
+    points = random.uniform((0, 0, 0), (4.0, 2.0, 1.5), (4000, 3))
+    found = lookup.irradiance(field, points, np.tile([0.0, 0.0, 1.0], (len(points), 1)))[:, 0]
+    exact = (c + a * points[:, 0] ** 3) * 0.28209479177387814 * np.pi
+    measured = np.sqrt(((found - exact) ** 2).mean()) / exact.mean()
+    assert measured <= np.sqrt((estimate.astype(float) ** 2).mean()) <= 6 * measured
 
 
 def test_nothing_is_known_beside_probes_without_light_of_their_own():

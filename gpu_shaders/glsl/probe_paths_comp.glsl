@@ -1,0 +1,113 @@
+/* Paths that leave probes in all directions and follow light to its end, whatever the bake made of it: an independent estimate of what the
+ * probes should hold. No texel, patch or band is in it.
+ *
+ * Dispatch: one thread a path, paths_each a probe; groups of 64. Each writes three samples (direction, radiance over density) that together
+ * estimate the light from everywhere: the path (density 1/4π), one point on the sampled emitters, one place on a sun of the world.
+ * The path's first direction is stratified over the probe's paths; everything after it is independent (one shifted sequence for several
+ * bounces would be correlated between them). Directions carry in w whether the first surface is seen from behind.
+ */
+
+const float SPHERE = 12.566370614359172;
+
+float share_of_points(float density, float distance, float cosine)
+{
+  float by_points = density * distance * distance;
+  return by_points / (by_points + cosine / SPHERE);
+}
+
+vec2 random_pair(uvec3 key)
+{
+  return vec2(pcg3d(key).xy >> 8u) * (1.0 / 16777216.0);
+}
+
+void store(int entry, int part, vec3 direction, float behind, vec3 flux)
+{
+  ivec2 place = element_position(3 * entry + part);
+  imageStore(directions, place, vec4(direction, behind));
+  imageStore(flux_out, place, vec4(flux, 0.0));
+}
+
+void main()
+{
+  int entry = LINEAR_THREAD;
+  if (entry >= path_count) {
+    return;
+  }
+  int probe = entry / paths_each;
+  int number = first_number + entry - probe * paths_each;
+  uvec3 key = uvec3(uint(probe), 0x9E3779B1u, uint(seed));
+  uvec3 own_key = pcg3d(key + uvec3(0u, uint(number), 0u));
+  vec3 start = element(probe_points, probe).xyz;
+
+  vec3 towards = vec3(0.0, 0.0, 1.0), flux = vec3(0.0);
+#ifdef HAS_EMITTERS
+  EmitterSample emitter = sample_emitter(sample_r3(key + uvec3(0u, 1u, 0u), number));
+  vec3 offset = emitter.point - start;
+  float distance = max(length(offset), 1.0e-10);
+  towards = offset / distance;
+  float cosine = abs(dot(towards, emitter.normal));
+  flux = emitter.radiance * (cosine / (emitter.density * distance * distance) *
+                             share_of_points(emitter.density, distance, cosine));
+  if (flux != vec3(0.0) && trace_any(start, towards, distance * 0.9999)) {
+    flux = vec3(0.0);
+  }
+#endif
+  store(entry, 1, towards, 0.0, flux);
+
+  flux = vec3(0.0);
+  int suns = light_count - first_sun;
+  if (suns > 0) {
+    int sun = first_sun + number % suns;
+    LightSample light_sample = sample_light(sun, start, sample_r2(key + uvec3(0u, 2u, 0u), number));
+    towards = light_sample.direction;
+    flux = trace_any(start, towards, NO_HIT) ? vec3(0.0) : light_sample.irradiance * float(suns);
+  }
+  store(entry, 2, towards, 0.0, flux);
+
+  vec2 u = sample_r2(key, number);
+  float height = 1.0 - 2.0 * u.x, radius = sqrt(max(1.0 - height * height, 0.0));
+  vec3 first = vec3(radius * cos(6.283185307179586 * u.y), radius * sin(6.283185307179586 * u.y), height);
+  vec3 origin = start, direction = first, radiance = vec3(0.0), throughput = vec3(1.0);
+  float behind = 0.0;
+  for (int segment = 0; segment <= bounces; segment++) {
+    Hit hit = trace_closest(origin, direction);
+    if (hit.triangle < 0) {
+      ivec2 texel = direction_texel(direction);
+      radiance += throughput * element(world_texels, texel.y * FACE + texel.x).rgb;
+      break;
+    }
+    Surface surface = resolve_surface(hit.triangle, hit.barycentric, origin, direction, segment == 0 ? 0.05 : 0.5);
+    if (surface.emitter_density == 0.0) {
+      radiance += throughput * surface.emission;
+    }
+    else if (segment == 0) {
+      vec3 a = element(triangle_corners, 3 * hit.triangle).xyz;
+      vec3 across = cross(element(triangle_corners, 3 * hit.triangle + 1).xyz - a,
+                          element(triangle_corners, 3 * hit.triangle + 2).xyz - a);
+      float cosine = abs(dot(direction, normalize(across)));
+      radiance += surface.emission * (1.0 - share_of_points(surface.emitter_density, hit.distance, cosine));
+    }
+    behind = segment == 0 && surface.back ? 1.0 : behind;
+    throughput *= surface.albedo;
+    float survival = min(max(max(throughput.r, throughput.g), throughput.b), 1.0);
+    if (survival == 0.0) {
+      break;
+    }
+    uvec3 segment_key = pcg3d(own_key + uvec3(uint(segment), 0u, 0u));
+    if (segment > 0) { /* Russian roulette (Arvo and Kirk, SIGGRAPH 1990) */
+      if (random_pair(segment_key + uvec3(3u, 0u, 0u)).x >= survival) {
+        break;
+      }
+      throughput /= survival;
+    }
+    vec3 normal = surface.normal;
+    origin = step_off(surface.position, normal, -direction, hit.distance);
+    vec3 irradiance = lamps_irradiance(surface.position, origin, normal, segment_key + uvec3(1u, 0u, 0u), 0);
+#ifdef HAS_EMITTERS
+    irradiance += emitter_irradiance(surface.position, origin, normal, segment_key + uvec3(5u, 0u, 0u), 0);
+#endif
+    radiance += throughput * irradiance * 0.3183098861837907;
+    direction = sample_cosine(normal, random_pair(segment_key + uvec3(2u, 0u, 0u)));
+  }
+  store(entry, 0, first, behind, radiance * SPHERE);
+}

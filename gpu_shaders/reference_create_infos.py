@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bindings of the shader that checks a bake by paths. Same form as create_infos.py."""
+
+from __future__ import annotations
+
+from .create_infos import _emitters, _image, _ints, _light_files, _samplers, _scene
+
+
+def probe_paths_comp(info, defines):
+    slot = _scene(info, defines)
+    slot = _emitters(info, defines, slot)
+    _samplers(info, "lights", "probe_points", "world_texels", first=slot)
+    _image(info, 0, "directions")
+    _image(info, 1, "flux_out")
+    _ints(info, "path_count", "paths_each", "first_number", "light_count", "first_sun", "bounces", "seed")
+    info.local_group_size(64, 1, 1)
+    files = _light_files(defines | {"HAS_ALPHA": True})
+    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *files, "probe_paths_comp"]}

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Paths against closed forms, and bakes that are given an error: what they choose, keep and say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gridlight.bake.error_driven import ErrorDrivenBake
+from gridlight.bake.session import BakeSession
+from gridlight.core.error_budget import ErrorGoal
+from gridlight.core.grid import Grid
+from gridlight.core.path_check import NORMALS, PathCheck, irradiance_of
+from gridlight.core.settings import BakeSettings
+from gridlight.core.snapshot import Material, World
+from gridlight.gpu_shaders.probe_paths import ProbePaths
+from gridlight.gpu_shaders.scene_textures import SceneTextures
+from small_scenes import Silent, all_lights, box, cluttered_room, furnace, snapshot_of
+
+GRID = Grid.from_bounds((-0.7, -0.7, -0.6), (0.7, 0.7, 0.7), (2, 2, 2))
+NO_EMITTERS = 0.0
+
+
+def checked(snapshot, positions, paths, bounces=None):
+    scene = SceneTextures(snapshot, GRID.center, np.full(len(snapshot.triangles), NO_EMITTERS))
+    check = PathCheck(len(positions))
+    for half in (0, 1):
+        directions, flux, _behind = ProbePaths(scene, snapshot, GRID, positions).trace(0, paths, bounces, half + 1)
+        check.add(half, directions, flux)
+    check.paths = paths
+    return check
+
+
+@pytest.mark.parametrize("albedo", [0.0, 0.5, 0.9])
+def test_paths_in_a_furnace_find_its_closed_form(albedo):
+    check = checked(furnace(albedo), GRID.positions(), 1024)
+    np.testing.assert_allclose(check.irradiance.mean(), np.pi / (1 - albedo), rtol=0.01)
+
+
+def test_paths_stop_after_the_bounces_asked_for():
+    """Emission E and albedo a: n bounces give E (1 + a + … + aⁿ⁺¹), of which the first term is seen, not bounced."""
+    for bounces in (1, 2, 5):
+        found = checked(furnace(0.5), GRID.positions(), 1024, bounces).irradiance.mean()
+        np.testing.assert_allclose(found, np.pi * sum(0.5**n for n in range(bounces + 1)), rtol=0.01)
+
+
+def test_paths_see_the_sky():
+    snapshot = replace(snapshot_of(box((5, 5, 5), (5.01, 5.01, 5.01))), world=World((1.0, 2.0, 3.0)))
+    found = checked(snapshot, GRID.positions(), 512).irradiance
+    np.testing.assert_allclose(found.mean(axis=(0, 1, 2)), np.pi * np.array([1, 2, 3]), rtol=0.01)
+
+
+def driven(snapshot, target, kept=(), **settings):
+    bake = ErrorDrivenBake(snapshot, GRID, BakeSettings(**settings), ErrorGoal(target, frozenset(kept)), Silent())
+    for _ in bake.bake():
+        pass
+    return bake.result
+
+
+def room():
+    return cluttered_room({name: light for name, light in all_lights().items() if name in ("point", "rectangle")})
+
+
+@pytest.mark.nightly
+def test_the_predicted_error_is_that_against_a_fine_bake():
+    """The reference is a bake too, but of 16 times the texels and 8 times the samples; paths have no part in it."""
+    result = driven(room(), 0.04, kept=["bands"])
+    fine = BakeSession(room(), GRID, BakeSettings(face=32, samples=8, seed=99), Silent())
+    for _ in fine.bake():
+        pass
+    active = result.field.state == 1
+    found, exact = (irradiance_of(f.coefficients[active], NORMALS) for f in (result.field, fine.result.field))
+    within_bands = np.sqrt(((found - exact) ** 2).mean() / (exact**2).mean())
+    error = result.error
+    assert error["met"] and within_bands <= 0.04
+    assert np.hypot(within_bands, error["parts"]["floor"]) == pytest.approx(error["predicted"], rel=0.5, abs=0.006)
+
+
+def test_what_is_given_is_kept_and_the_same_comes_out_again():
+    first, second = (driven(room(), 0.05, kept=["face", "bands"], face=9, bands=2) for _ in range(2))
+    assert (first.settings.face, first.settings.bands) == (9, 2)
+    assert first.error == second.error
+    for name in ("coefficients", "gradient", "depth", "offset"):
+        assert getattr(first.field, name).tobytes() == getattr(second.field, name).tobytes()
+
+
+def test_a_target_below_the_floor_is_refused_in_words_and_the_floor_is_told():
+    result = driven(room(), 0.001, kept=["samples", "face"], face=8)
+    assert not result.error["met"] and result.error["predicted"] > 0.001
+    assert any("was not reached" in warning and "3 bands alone lose" in warning for warning in result.warnings)
+
+
+def test_even_light_needs_one_band():
+    result = driven(furnace(0.5), 0.1)
+    assert result.error["met"] and result.field.bands == 1
+    np.testing.assert_allclose(result.field.coefficients[:, 0], 2.0 * np.sqrt(4 * np.pi), rtol=2e-2)
+
+
+def test_without_light_there_is_no_error_to_tell():
+    result = driven(snapshot_of(box(), materials=[Material("grey")]), 0.02)
+    assert result.error["predicted"] is None and any("no light" in warning for warning in result.warnings)
