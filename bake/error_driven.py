@@ -54,7 +54,8 @@ _BEHIND = 0.25  # of back faces in sight: more, and a place is inside something
 
 class ErrorDrivenBake:
     """``bake`` once; ``result`` is then like that of a BakeSession, with ``settings`` and ``error``. ``session`` is
-    that of the last pass over all probes; a relight of it does not look after the error."""
+    that of the last pass over all probes; a relight of it does not look after the error. ``whole`` is the field before
+    probes gave up upper bands."""
 
     def __init__(
         self,
@@ -88,6 +89,7 @@ class ErrorDrivenBake:
         self._passes: list[str] = []
         self._spent = 0.0
         self._between: SquaredError | None = None
+        self.whole: Field | None = None
 
     # The whole
     # ------------------------------------------------------------------------------------------------------------------
@@ -287,6 +289,7 @@ class ErrorDrivenBake:
         else:
             bands = self._fewest_bands(error)
             result.field = self._light.field_of(self._light.mean[:, : bands**2])
+            self.whole = replace(result.field)
             kept = self._adapt_bands(result.field)
             result.error = {**self._said(result.field, why), "bands": kept}
         self.session.result = result  # what a relight goes on from

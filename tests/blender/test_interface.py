@@ -5,11 +5,12 @@ import bpy
 import gridlight
 import numpy as np
 import pytest
+from gridlight.core.error_budget import ErrorGoal
 from gridlight.core.grid import Grid
 from gridlight.core.settings import BakeSettings
 from gridlight.formats import probe_file
 from gridlight.scene import probe_objects
-from gridlight.scene.field_storage import load_field, stored_counts
+from gridlight.scene.field_storage import load_field, stored_counts, stored_details
 from gridlight.scene.volumes import create_volume
 
 
@@ -127,6 +128,18 @@ def test_bake_is_in_the_file_after_saving_and_loading(room, gpu_context, tmp_pat
     assert again.metadata == baked.metadata and again.gradient.any()
     del bpy.data.objects["Room"]["gridlight_field"]["gradient"]  # as it was stored before there were any
     assert not load_field(bpy.data.objects["Room"]).gradient.any()
+
+
+def test_a_target_error_is_baked_for_and_what_was_reached_is_told(room, gpu_context):
+    settings = bpy.context.scene.gridlight
+    assert settings.error_goal() is None
+    settings.use_error, settings.target_error = True, 0.2
+    assert settings.error_goal() == ErrorGoal(0.2)
+    assert bpy.ops.gridlight.bake() == {"FINISHED"}
+    baked = load_field(room)
+    assert baked.metadata["error"]["target"] == 0.2 and baked.metadata["error"]["met"]
+    assert baked.bands == baked.metadata["settings"]["bands"] < 3
+    assert "error at probes" in stored_details(room)["outcome"]
 
 
 def test_a_copied_volume_keeps_the_originals_light_apart(room, gpu_context):

@@ -83,6 +83,28 @@ def test_what_is_given_is_kept_and_the_same_comes_out_again():
         assert getattr(first.field, name).tobytes() == getattr(second.field, name).tobytes()
 
 
+@pytest.mark.nightly
+def test_more_passes_make_it_better_and_go_where_they_are_needed():
+    grid = Grid.from_bounds((-0.7, -0.7, -0.6), (0.7, 0.7, 0.7), (4, 4, 4))
+    bake = ErrorDrivenBake(room(), grid, BakeSettings(face=6), ErrorGoal(0.011, frozenset({"face", "bands"})), Silent())
+    for _ in bake.bake():
+        pass
+    passes = [int(told.split()[-2]) for told in bake.result.error["passes"]]
+    assert len(passes) > 1 and passes[0] == passes[1] == bake.result.counts["active"] and passes[-1] <= passes[0]
+    once = BakeSession(room(), grid, bake.result.settings, Silent())
+    once.settings = replace(once.settings, samples=1)
+    fine = BakeSession(room(), grid, BakeSettings(face=32, samples=8, seed=99), Silent())
+    for session in (once, fine):
+        for _ in session.bake():
+            pass
+    active = bake.result.field.state == 1
+    found, first, exact = (
+        irradiance_of(field.coefficients[active], NORMALS)
+        for field in (bake.result.field, once.result.field, fine.result.field)
+    )
+    assert ((found - exact) ** 2).mean() < 0.8 * ((first - exact) ** 2).mean()
+
+
 def test_a_target_below_the_floor_is_refused_in_words_and_the_floor_is_told():
     result = driven(room(), 0.001, kept=["samples", "face"], face=8)
     assert not result.error["met"] and result.error["predicted"] > 0.001
