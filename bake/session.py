@@ -321,7 +321,7 @@ class BakeSession:
     def _light_again(self, changes: SceneChanges, had_emitters: bool, live: bool) -> Steps[bool]:
         """Light for patches that stay; returns whether they could."""
         light, relit = self.backend.light, self.result.relit
-        before = light.source
+        before = light.source()
         emitters = changes.emission and (had_emitters or self.backend.scene.emitter_count > 0)
         lamps = self._changed_lamps(changes)
         if lamps.any() or changes.lights_removed or changes.world or emitters:
@@ -337,8 +337,7 @@ class BakeSession:
             yield from judge(self._placement, self._batches, self.backend)
             if self._placement.is_outdated:
                 return False
-        after = light.source
-        small = np.square(after - before).sum() < _SMALL_CHANGE**2 * np.square(after).sum()
+        small = light.changed_source(before) < _SMALL_CHANGE
         relit.warm_start = bool(self.settings.bounces is None and small)
         yield from self._bounce(relit.warm_start)
         if emitters:

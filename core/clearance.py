@@ -30,12 +30,13 @@ def obstacles(grid: Grid, snapshot: SceneSnapshot) -> np.ndarray:
     """(T, 3, 3) triangles of ``snapshot`` to keep clear of: those of objects larger than the clearance, but no needles.
     Dust, leaves and threads hide nothing from a probe beside them."""
     corners = snapshot.triangle_positions
-    count = max(len(snapshot.object_names), 1)
-    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    np.minimum.at(low, snapshot.object_index, corners.min(axis=1))
-    np.maximum.at(high, snapshot.object_index, corners.max(axis=1))
-    with np.errstate(invalid="ignore"):  # objects without triangles
-        large = np.linalg.norm(high - low, axis=1) > CLEARANCE * grid.cell_size().min()
+    large = np.zeros(max(len(snapshot.object_names), 1), bool)
+    by_object = np.argsort(snapshot.object_index, kind="stable")
+    present, first = np.unique(snapshot.object_index[by_object], return_index=True)
+    if len(present):
+        low = np.minimum.reduceat(corners.min(axis=1)[by_object], first)
+        high = np.maximum.reduceat(corners.max(axis=1)[by_object], first)
+        large[present] = np.linalg.norm(high - low, axis=1) > CLEARANCE * grid.cell_size().min()
     edges = np.roll(corners, -1, axis=1) - corners
     doubled_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
     thick = doubled_area > _TOUCH * grid.cell_size().min() * np.linalg.norm(edges, axis=2).max(axis=1)

@@ -52,5 +52,5 @@ def _usable(neighbours: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 def _mean(values: np.ndarray, neighbours: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Mean of ``values`` (P, K, 3) over ``neighbours`` (N, 6) where ``weights`` (N, 6) is true."""
-    total = sum(values[neighbours[:, i]] * weights[:, i, None, None] for i in range(neighbours.shape[1]))
+    total = (values[neighbours] * weights[:, :, None, None]).sum(axis=1)
     return total / weights.sum(axis=1)[:, None, None]

@@ -13,6 +13,7 @@ import numpy as np
 
 _LIT_SHARE = 0.02  # of the back faces seen: a spot lights little of a room, less than this is a leak of light
 _MOST = 0.5  # of the sphere
+_MOST_PAIRS = 1 << 22  # of probes and objects that are counted without sorting
 _OPEN_SHARE = 0.01  # of a probe's directions that see background: the inside of a solid sees none
 
 
@@ -46,8 +47,10 @@ class ShellVote:
         self._any_light |= bool(((size > item + 1.25) | ~seen).any())
         probe = np.broadcast_to(np.arange(len(sightings))[:, None], sightings.shape)
         # A probe in front of an object may hit the far side of an edge; only those that see mostly back faces count.
-        pair, inverse = np.unique(probe[seen] * len(self._behind) + item[seen], return_inverse=True)
-        mostly_behind = np.bincount(inverse, np.sign(sightings[seen]), len(pair))[inverse] < 0
+        pair = probe[seen] * len(self._behind) + item[seen]
+        if len(sightings) * len(self._behind) > _MOST_PAIRS:
+            pair = np.unique(pair, return_inverse=True)[1]
+        mostly_behind = np.bincount(pair, np.sign(sightings[seen]))[pair] < 0
         from_behind = mostly_behind & (sightings[seen] < 0)
         item, lit = item[seen][from_behind], lit[seen][from_behind]
         self._behind += np.bincount(item, minlength=len(self._behind))

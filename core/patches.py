@@ -39,7 +39,7 @@ _MANY_PROBES = 128  # in smaller grids probes share less, and patches are smalle
 _LEAST_ANGLE = 0.25  # of ANGLE
 _MANY = 44000  # patches whose mean is good with the plain number of rays
 _MOST_EFFORT = 256
-_UNEVEN = (0.6, 3.0)  # error of four points, of the mean light, from which on the second and third number is taken
+UNEVEN = (0.6, 3.0)  # error of four points, of the mean light, from which on the second and third number is taken
 _CELL_SHARE = 0.25  # of the grid's shortest spacing: edge of plain cells
 _LEAST_CELLS = 32  # plain cells along the diagonal of the volume's box
 VARIANTS = 3  # patches of one cell that do not see each other; hits beyond join the last
@@ -68,7 +68,7 @@ def direct_samples(deviation: np.ndarray, mean_light: float) -> np.ndarray:
     """(N,) index into SAMPLES for patches whose points get irradiance of ``deviation`` (N,) from a part of the light if
     nothing stands between: the error of its mean by four points is held against the mean light of all patches."""
     error = deviation / np.sqrt(SAMPLES[0]) / max(mean_light, 1e-30)
-    return np.searchsorted(_UNEVEN, error, side="right")
+    return np.searchsorted(UNEVEN, error, side="right")
 
 
 def light_parts(lamps: int, has_emitters: bool) -> list[Part]:

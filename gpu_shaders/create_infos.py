@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from ..core.conventions import DEPTH_EDGE
 from ..core.gradients import LEAST_COSINE
+from ..core.images import HALF_MAX
 from ..core.lookup import BEYOND, INVALID_WEIGHT, LEAST_WEIGHT
 
 NO_SURFACE = "1.0e30"
@@ -55,6 +56,22 @@ def _surface_files(defines: dict) -> list[str]:
     return ["surface_lib"] if "HAS_ALPHA" in defines else []
 
 
+def image_mip_comp(info, defines):
+    _image(info, 0, "texels", access="READ+WRITE")
+    _ints(info, "before_start", "before_width", "before_height", "start", "width", "height")
+    info.local_group_size(64, 1, 1)
+    return {"compute": ["data_lib", "image_mip_comp"]}
+
+
+def image_store_comp(info, defines):
+    info.define("HALF_MAX", repr(HALF_MAX))
+    _samplers(info, "texels")
+    _image(info, 0, "halves", pixel="RGBA16F")
+    _ints(info, "first", "count")
+    info.local_group_size(64, 1, 1)
+    return {"compute": ["data_lib", "image_store_comp"]}
+
+
 def capture_trace_comp(info, defines):
     slot = _scene(info, defines, attributes=False)
     _samplers(info, "probe_slots", first=slot)
@@ -84,15 +101,14 @@ def capture_raster(info, defines):
     info.push_constant("FLOAT", "far_distance")
     stage = GPUStageInterfaceInfo("capture_raster_iface")
     stage.flat("FLOAT", "hit_triangle")
-    stage.smooth("VEC2", "hit_barycentric")
-    stage.smooth("VEC3", "hit_offset")
+    stage.flat("FLOAT", "hit_layer")
     info.vertex_out(stage)
     info.vertex_in(0, "FLOAT", "vertex_number")
     info.depth_write("ANY")
     info.fragment_out(0, "VEC4", "hit")
     return {
         "vertex": ["data_lib", "octahedral_lib", "cubemap_lib", "capture_raster_vert"],
-        "fragment": ["data_lib", *_surface_files(defines), "capture_raster_frag"],
+        "fragment": ["data_lib", "octahedral_lib", "cubemap_lib", *_surface_files(defines), "capture_raster_frag"],
     }
 
 
@@ -203,7 +219,7 @@ def patch_spread_comp(info, defines):
     slot = _scene(info, defines, attributes="HAS_EMITTERS" in defines)
     slot = _emitters(info, defines, slot)
     _samplers(info, "lights", "patch_points", first=slot)
-    _image(info, 0, "spread")
+    _image(info, 0, "spread", pixel="RG32F")
     _ints(info, "first_patch", "patch_count", "first_light", "light_count", "seed")
     info.define("FIRST_LIGHT", "first_light")
     info.local_group_size(64, 1, 1)
@@ -215,7 +231,7 @@ def patch_direct_comp(info, defines):
     slot = _emitters(info, defines, slot)
     _samplers(info, "lights", "patches", "patch_points", first=slot)
     _image(info, 0, "sums")
-    _ints(info, "patch_count", "runs", "first_key", "first_light", "light_count", "samples", "seed")
+    _ints(info, "first_entry", "patch_count", "runs", "first_key", "first_light", "light_count", "samples", "seed")
     info.define("FIRST_LIGHT", "first_light")
     info.local_group_size(64, 1, 1)
     return {"compute": ["data_lib", "octahedral_lib", *_light_files(defines), "patch_direct_comp"]}
@@ -224,7 +240,7 @@ def patch_direct_comp(info, defines):
 def patch_mean_comp(info, defines):
     _samplers(info, "patches", "sums")
     _image(info, 0, "direct", access="READ+WRITE")
-    _ints(info, "patch_count", "runs", "samples")
+    _ints(info, "first_entry", "patch_count", "runs", "samples", "begins")
     info.local_group_size(64, 1, 1)
     return {"compute": ["data_lib", "patch_mean_comp"]}
 

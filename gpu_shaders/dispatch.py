@@ -6,6 +6,7 @@ from __future__ import annotations
 import gpu
 
 GROUP = 64  # threads
+COMPACTION_BLOCK = 4096  # entries of a compaction that a group takes, see compaction_lib.glsl
 _GROUPS_IN_ROW = 2**21 // GROUP
 
 

@@ -20,6 +20,16 @@ def copy_elements(source: gpu.types.GPUTexture, target: gpu.types.GPUTexture, pi
     dispatch_linear(shader, count)
 
 
+def fill_elements(target: gpu.types.GPUTexture, first: int, count: int, value: float) -> None:
+    """Sets ``count`` elements of ``target`` (R32F) from ``first`` on to ``value``."""
+    shader = program("fill_elements_comp")
+    shader.image("target", target)
+    shader.uniform_int("first", (first,))
+    shader.uniform_int("count", (count,))
+    shader.uniform_float("value", value)
+    dispatch_linear(shader, count)
+
+
 class GrowingArray:
     """``texture`` holds at least as many elements as were reserved; the new ones are zero, or ``fill`` where they are
     integers."""

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bindings of the shaders that find patches, see patch_finder.py. Same form as create_infos.py."""
+"""Bindings of the shaders that find patches and choose which to light, see patch_finder.py and patch_direct.py. Same form
+as create_infos.py."""
 
 from __future__ import annotations
 
-from ..core.patches import POINTS
+from ..core.patches import POINTS, SAMPLES, UNEVEN
 from .create_infos import _image, _ints, _samplers, _scene, _surface_files
 
 
@@ -39,41 +40,68 @@ def patch_claim_comp(info, defines):
     return _linear(info, "random_lib", "patch_cell_lib", "patch_claim_comp")
 
 
-def _compaction(info, defines: dict, *names: str) -> int:
-    """What patch_select_lib reads, and samplers ``names``; returns the first free image."""
+def _pending(info, defines: dict, *names: str) -> int:
+    """What patch_pending_lib reads, and samplers ``names``; returns the first free image."""
     leads = "LEADERS" in defines
     _samplers(info, "items", "bound", *(["slots"] if leads else []), *names)
     _ints(info, "item_count", "hit_count")
-    info.define("POINTS", str(POINTS))
-    info.local_group_size(256, 1, 1)
     if leads:
         _atomic(info, 0, "table")
         _atomic(info, 1, "leaders")
     return 2 if leads else 0
 
 
-_COMPACTION_FILES = ("data_lib", "random_lib", "patch_cell_lib", "patch_select_lib")
+def _due(info, *names: str) -> int:
+    """The same for patch_due_lib."""
+    _samplers(info, "spread", "mean_lights", *names)
+    _ints(info, "patch_count", "sample_class")
+    _image(info, 0, "classes", pixel="R32F", access="READ+WRITE")
+    info.define("ROOT_OF_SAMPLES", repr(SAMPLES[0] ** 0.5))
+    info.define("UNEVEN", repr(UNEVEN[0]))
+    info.define("VERY_UNEVEN", repr(UNEVEN[1]))
+    return 1
 
 
-def patch_count_comp(info, defines):
-    _image(info, _compaction(info, defines), "block_counts", pixel="R32F")
-    return {"compute": [*_COMPACTION_FILES, "patch_count_comp"]}
+_PENDING_FILES = ("random_lib", "patch_cell_lib", "patch_pending_lib")
+
+
+def _compaction(info, *files: str, places: bool = True) -> dict:
+    info.local_group_size(256, 1, 1)
+    info.define("POINTS", str(POINTS))
+    if places:
+        info.define("PLACES", "")
+    return {"compute": ["data_lib", *files]}
+
+
+def compact_count_comp(info, defines):
+    picks_due = "DUE" in defines
+    _image(info, _due(info) if picks_due else _pending(info, defines), "block_counts", pixel="R32F")
+    files = ["patch_due_lib"] if picks_due else _PENDING_FILES
+    return _compaction(info, *files, "compaction_lib", "compact_count_comp", places=False)
 
 
 def patch_number_comp(info, defines):
-    image = _compaction(info, defines, "block_counts", "total_in", "hit_keys", "hits")
+    image = _pending(info, defines, "block_counts", "total_in", "hit_keys", "hits")
     _image(info, image, "total_out", pixel="R32F")
     _image(info, image + 1, "patch_keys")
     _image(info, image + 2, "patch_points")
     _ints(info, "variant")
-    return {"compute": [*_COMPACTION_FILES, "patch_place_lib", "patch_number_comp"]}
+    return _compaction(info, *_PENDING_FILES, "compaction_lib", "patch_number_comp")
 
 
 def patch_pending_comp(info, defines):
-    image = _compaction(info, defines, "block_counts")
+    image = _pending(info, defines, "block_counts")
     _image(info, image, "total_out", pixel="R32F")
     _image(info, image + 1, "pending", pixel="R32F")
-    return {"compute": [*_COMPACTION_FILES, "patch_place_lib", "patch_pending_comp"]}
+    return _compaction(info, *_PENDING_FILES, "compaction_lib", "patch_pending_comp")
+
+
+def patch_due_comp(info, defines):
+    image = _due(info, "block_counts")
+    _image(info, image, "due", pixel="R32F")
+    _image(info, image + 1, "due_counts", pixel="R32F")
+    _ints(info, "result")
+    return _compaction(info, "patch_due_lib", "compaction_lib", "patch_due_comp")
 
 
 def patch_join_comp(info, defines):
@@ -119,3 +147,27 @@ def copy_elements_comp(info, defines):
     _ints(info, "first", "count")
     info.local_group_size(64, 1, 1)
     return {"compute": ["data_lib", "copy_elements_comp"]}
+
+
+def fill_elements_comp(info, defines):
+    _image(info, 0, "target", pixel="R32F")
+    _ints(info, "first", "count")
+    info.push_constant("FLOAT", "value")
+    info.local_group_size(64, 1, 1)
+    return {"compute": ["data_lib", "fill_elements_comp"]}
+
+
+def patch_reduce_comp(info, defines):
+    _samplers(info, "values", *(["others"] if "LARGEST" in defines else []))
+    _image(info, 0, "results", pixel="R32F")
+    _ints(info, "first", "stop", "result")
+    info.local_group_size(256, 1, 1)
+    return {"compute": ["data_lib", "patch_reduce_comp"]}
+
+
+def patch_add_comp(info, defines):
+    _samplers(info, "added")
+    _image(info, 0, "total", access="READ+WRITE")
+    _ints(info, "patch_count", "begins")
+    info.local_group_size(64, 1, 1)
+    return {"compute": ["data_lib", "patch_add_comp"]}

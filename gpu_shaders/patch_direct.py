@@ -7,18 +7,17 @@ that depends on how unevenly a lamp lights a patch, held against the mean light 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import gpu
 import numpy as np
 
-from ..core.patches import ALL, EMITTERS, POINTS, SAMPLES, Part, direct_samples, light_parts
+from ..core.patches import ALL, EMITTERS, POINTS, SAMPLES, Part, light_parts
 from ..core.settings import BakeSettings
 from ..core.steps import Pace, Steps
-from .dispatch import dispatch_linear
+from .dispatch import COMPACTION_BLOCK, dispatch_linear
+from .growing_array import GrowingArray, fill_elements
 from .programs import program
 from .scene_textures import SceneTextures
-from .textures import allocate, read, upload
+from .textures import allocate, read
 
 _SAMPLES_EACH = 16  # of one lamp, or of emitters, that a thread takes
 _LAMPS_AT_ONCE = 32  # that a thread takes
@@ -26,47 +25,50 @@ _THREADS_AT_ONCE = 1 << 20
 _UNLIT = -1  # in place of an index into SAMPLES
 
 
-@dataclass
 class _PartLight:
-    """What one part of the light does to N patches."""
+    """What one part of the light does to N patches, as arrays of an element a patch."""
 
-    values: np.ndarray = field(default_factory=lambda: np.zeros((0, 4), np.float32))  # (N, 4) irradiance
-    mean: np.ndarray = field(default_factory=lambda: np.zeros(0, np.float32))  # (N,) if nothing stood between
-    deviation: np.ndarray = field(default_factory=lambda: np.zeros(0, np.float32))  # (N,) over a patch's points
-    sample_class: np.ndarray = field(
-        default_factory=lambda: np.zeros(0, np.int8)
-    )  # (N,) that ``values`` were taken with
+    def __init__(self) -> None:
+        self.values = GrowingArray("patches")  # irradiance
+        self.spread = GrowingArray("patches", "RG32F")  # mean and deviation over the points if nothing stood between
+        self.classes = GrowingArray("patches", "R32F")  # index into SAMPLES that ``values`` were taken with
 
-    def grow(self, mean: np.ndarray, deviation: np.ndarray) -> None:
-        """Adds patches that are not lit yet."""
-        count = len(mean)
-        self.values = np.concatenate([self.values, np.zeros((count, 4), np.float32)])
-        self.mean = np.concatenate([self.mean, mean])
-        self.deviation = np.concatenate([self.deviation, deviation])
-        self.sample_class = np.concatenate([self.sample_class, np.full(count, _UNLIT, np.int8)])
+    def grow(self, first: int, stop: int) -> None:
+        """Adds patches ``first`` .. ``stop``, which are not lit yet."""
+        for array in (self.values, self.spread, self.classes):
+            array.reserve(stop)
+        fill_elements(self.classes.texture, first, stop - first, _UNLIT)
 
 
 class PatchDirect:
-    """``values`` (N, 4) float32 is the irradiance of all patches lit so far, ``texture`` the same on the GPU."""
+    """``texture`` is the irradiance of all patches lit so far, an element a patch."""
 
     def __init__(self, scene: SceneTextures, settings: BakeSettings, pace: Pace):
         self.effort = 1  # by which SAMPLES are multiplied
         self._scene, self._settings, self._pace = scene, settings, pace
         self._together: list[tuple[int, int]] = []  # ranges of patches, each with its own mean light
         self._parts: dict[Part, _PartLight] = {}
-        self._sum()
+        self._total = GrowingArray("patches")
+        self._total.reserve(0)
+        self._mean_lights = GrowingArray("patches", "R32F")
 
     @property
     def count(self) -> int:
         """Patches lit so far."""
         return self._together[-1][1] if self._together else 0
 
+    @property
+    def texture(self) -> gpu.types.GPUTexture:
+        return self._total.texture
+
     def add(self, points: gpu.types.GPUTexture, count: int) -> Steps[None]:
         """Lights those of ``count`` patches with ``points`` (see PatchFinder) that are not lit yet, in steps."""
         fresh = (self.count, count)
         self._together.append(fresh)
         for part in self._wanted_parts():
-            self._parts.setdefault(part, _PartLight()).grow(*self.spread(part, points, *fresh))
+            light = self._parts.setdefault(part, _PartLight())
+            light.grow(*fresh)
+            self.find_spread(part, points, *fresh, light.spread.texture)
             yield
         yield from self._light_what_is_due(points)
 
@@ -82,8 +84,9 @@ class PatchDirect:
             if part in before and not differs:
                 self._parts[part] = before[part]
                 continue
-            self._parts[part] = _PartLight()
-            self._parts[part].grow(*self.spread(part, points, 0, self.count))
+            light = self._parts[part] = _PartLight()
+            light.grow(0, self.count)
+            self.find_spread(part, points, 0, self.count, light.spread.texture)
             lamps += 0 if part == EMITTERS else part[1] - part[0]
             yield
         yield from self._light_what_is_due(points)
@@ -92,94 +95,147 @@ class PatchDirect:
     def _wanted_parts(self) -> list[Part]:
         return light_parts(self._scene.lamp_count, self._scene.emitter_count > 0)
 
+    # How many samples
+    # ------------------------------------------------------------------------------------------------------------------
+
     def _light_what_is_due(self, points: gpu.types.GPUTexture) -> Steps[None]:
         """Patches that were not lit, or with another number of samples than they should have."""
-        for part, light in self._parts.items():
-            wanted = np.empty(self.count, np.int8)
-            for first, stop in self._together:
-                mean_light = float(sum(other.mean[first:stop].mean() for other in self._parts.values()))
-                wanted[first:stop] = direct_samples(light.deviation[first:stop], mean_light)
-            due = np.flatnonzero(wanted != light.sample_class)
-            if len(due):
-                target = allocate(self.count, "patches")
-                for index, samples in enumerate(SAMPLES):
-                    chosen = due[wanted[due] == index]
-                    yield from self.light(points, POINTS, chosen, samples * self.effort, target, part=part)
-                light.values[due] = read(target, self.count)[due]
-                light.sample_class = wanted
-        self._sum()
+        self._find_mean_lights()
+        kinds = [(part, index) for part in self._parts for index in range(len(SAMPLES))]
+        counts = allocate(max(len(kinds), 1), "patches", "R32F")
+        lists = [self._list_due(self._parts[part], index, counts, row) for row, (part, index) in enumerate(kinds)]
+        for (part, index), due, count in zip(kinds, lists, read(counts, len(kinds), channels=1)[:, 0].astype(int)):
+            if count:
+                target = self._parts[part].values.texture
+                samples = SAMPLES[index] * self.effort
+                yield from self.light(points, POINTS, due, int(count), samples, target, part=part)
+        self._add_up()
 
-    def _sum(self) -> None:
-        self.values = sum((light.values for light in self._parts.values()), np.zeros((self.count, 4), np.float32))
-        self.texture = upload(self.values, "patches")
+    def _find_mean_lights(self) -> None:
+        """What unevenness is held against: the mean light of all parts, by range of patches."""
+        parts, ranges = list(self._parts.values()), self._together
+        sums = allocate(max(len(parts) * len(ranges), 1), "patches", "R32F")
+        for row, (first, stop) in enumerate(ranges):
+            for column, light in enumerate(parts):
+                reduce_patches(light.spread.texture, first, stop, sums, row * len(parts) + column)
+        table = read(sums, len(parts) * len(ranges), channels=1).reshape(len(ranges), len(parts)).astype(float)
+        target = self._mean_lights.reserve(self.count)
+        for (first, stop), row in zip(ranges, table):
+            fill_elements(target, first, stop - first, float(row.sum()) / max(stop - first, 1))
 
-    def spread(self, part: Part, points: gpu.types.GPUTexture, first: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and standard deviation (stop − first,) of the luminance at the points of patches if nothing stands
-        between."""
-        count = stop - first
+    def _list_due(self, light: _PartLight, index: int, counts: gpu.types.GPUTexture, row: int) -> gpu.types.GPUTexture:
+        """Patches that ``light`` should light with SAMPLES[index] and has not yet, marked as lit so; their number goes
+        into element ``row`` of ``counts``."""
+        blocks = max(-(-self.count // COMPACTION_BLOCK), 1)
+        block_counts, due = allocate(blocks, "patches", "R32F"), allocate(self.count, "patches", "R32F")
+        for name in ("compact_count_comp", "patch_due_comp"):
+            shader = program(name, DUE=name == "compact_count_comp")
+            shader.uniform_sampler("spread", light.spread.texture)
+            shader.uniform_sampler("mean_lights", self._mean_lights.texture)
+            shader.image("classes", light.classes.texture)
+            shader.uniform_int("patch_count", (self.count,))
+            shader.uniform_int("sample_class", (index,))
+            if name == "compact_count_comp":
+                shader.image("block_counts", block_counts)
+            else:
+                shader.uniform_sampler("block_counts", block_counts)
+                shader.image("due", due)
+                shader.image("due_counts", counts)
+                shader.uniform_int("result", (row,))
+            gpu.compute.dispatch(shader, blocks, 1, 1)
+        return due
+
+    def _add_up(self) -> None:
+        """The total of all parts."""
+        total = self._total.reserve(self.count)
+        if not self._parts:
+            total.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
+        add_patches(total, self.count, [light.values.texture for light in self._parts.values()])
+
+    def find_spread(self, part: Part, points: gpu.types.GPUTexture, first: int, stop: int, spread) -> None:
+        """Mean and standard deviation of the luminance at the points of patches ``first`` .. ``stop`` if nothing stands
+        between, into ``spread`` (RG32F)."""
         shader = program("patch_spread_comp", POINTS=POINTS, **self._defines(part))
-        result = allocate(count, "patches")
         self._bind(shader, part)
         shader.uniform_sampler("patch_points", points)
-        shader.image("spread", result)
-        for name, value in (("first_patch", first), ("patch_count", count), ("seed", self._settings.seed)):
+        shader.image("spread", spread)
+        for name, value in (("first_patch", first), ("patch_count", stop - first), ("seed", self._settings.seed)):
             shader.uniform_int(name, (value,))
-        dispatch_linear(shader, count)
-        return tuple(read(result, count)[:, :2].T)
+        dispatch_linear(shader, stop - first)
+
+    # Samples
+    # ------------------------------------------------------------------------------------------------------------------
 
     def light(
-        self, points, points_each: int, chosen: np.ndarray, samples: int, target, first_key: int = 0, part: Part = ALL
+        self, points, points_each: int, chosen, count: int, samples: int, target, first_key: int = 0, part: Part = ALL
     ) -> Steps[None]:
-        """Adds direct light by ``part`` of patches or texels ``chosen`` (L,) with ``points_each`` places in ``points``
-        to ``target``, in steps."""
-        for portion in self._portions(part):
+        """Direct light by ``part`` of ``count`` patches or texels, whose numbers are in ``chosen``, with
+        ``points_each`` places in ``points``, into ``target``; in steps."""
+        for begins, portion in enumerate(self._portions(part)):
             lamps = 1 if portion == EMITTERS else portion[1] - portion[0]
             samples_each = max(1, _SAMPLES_EACH // lamps)
             at_once = max(1, _THREADS_AT_ONCE // -(-samples // samples_each))
 
-            def light(start: int, number: int, portion=portion, samples_each=samples_each) -> None:
-                some = chosen[start : start + number]
-                self._light_portion(portion, points, points_each, some, samples, samples_each, target, first_key)
+            def light(start: int, number: int, portion=portion, samples_each=samples_each, begins=begins == 0) -> None:
+                some = (start, number)
+                self._light_portion(
+                    portion, points, points_each, chosen, some, samples, samples_each, target, first_key, begins
+                )
 
-            yield from self._pace.portions(f"direct {samples}", len(chosen), light, 1024, at_once)
+            yield from self._pace.portions(f"direct {samples}", count, light, 1024, at_once)
 
     def _portions(self, part: Part) -> list[Part]:
         """``part`` in portions small enough for one thread, see patch_direct_comp.glsl."""
         if part == EMITTERS:
             return [EMITTERS]
         first, stop = (0, self._scene.lamp_count) if part == ALL else part
-        portions = [(at, min(at + _LAMPS_AT_ONCE, stop)) for at in range(first, stop, _LAMPS_AT_ONCE)]
+        portions: list[Part] = [(at, min(at + _LAMPS_AT_ONCE, stop)) for at in range(first, stop, _LAMPS_AT_ONCE)]
         return [*portions, EMITTERS] if part == ALL and self._scene.emitter_count else portions
 
     def _light_portion(
-        self, part: Part, points, points_each: int, chosen, samples: int, samples_each: int, target, first_key: int
+        self,
+        part: Part,
+        points,
+        points_each: int,
+        chosen,
+        some: tuple[int, int],
+        samples: int,
+        samples_each: int,
+        target,
+        first_key: int,
+        begins: bool,
     ) -> None:
-        rows = np.zeros((len(chosen), 4), np.float32)
-        rows[:, 0] = chosen
-        patches = upload(rows, "patches")
+        first_entry, count = some
         runs = -(-samples // samples_each)
-        sums = allocate(len(chosen) * runs, "patches")
+        sums = allocate(count * runs, "patches")
         shader = program("patch_direct_comp", POINTS=points_each, SAMPLES_EACH=samples_each, **self._defines(part))
         self._bind(shader, part)
-        shader.uniform_sampler("patches", patches)
+        shader.uniform_sampler("patches", chosen)
         shader.uniform_sampler("patch_points", points)
         shader.image("sums", sums)
         for name, value in (
-            ("patch_count", len(chosen)),
+            ("first_entry", first_entry),
+            ("patch_count", count),
             ("runs", runs),
             ("first_key", first_key),
             ("samples", samples),
             ("seed", self._settings.seed),
         ):
             shader.uniform_int(name, (value,))
-        dispatch_linear(shader, len(chosen) * runs)
+        dispatch_linear(shader, count * runs)
         shader = program("patch_mean_comp")
-        shader.uniform_sampler("patches", patches)
+        shader.uniform_sampler("patches", chosen)
         shader.uniform_sampler("sums", sums)
         shader.image("direct", target)
-        for name, value in (("patch_count", len(chosen)), ("runs", runs), ("samples", samples)):
+        for name, value in (
+            ("first_entry", first_entry),
+            ("patch_count", count),
+            ("runs", runs),
+            ("samples", samples),
+            ("begins", int(begins)),
+        ):
             shader.uniform_int(name, (value,))
-        dispatch_linear(shader, len(chosen))
+        dispatch_linear(shader, count)
 
     def _defines(self, part: Part) -> dict:
         return self._scene.light_defines if part == EMITTERS else self._scene.ray_defines
@@ -189,3 +245,27 @@ class PatchDirect:
         first, stop = (0, 0) if part == EMITTERS else part
         shader.uniform_int("first_light", (first,))
         shader.uniform_int("light_count", (stop,))
+
+
+def reduce_patches(values, first: int, stop: int, results, result: int, others=None) -> None:
+    """The sum of the first channel of elements ``first`` .. ``stop`` of ``values``, or with ``others`` the largest
+    colour of both added, into element ``result`` of ``results`` (R32F)."""
+    shader = program("patch_reduce_comp", LARGEST=others is not None)
+    shader.uniform_sampler("values", values)
+    if others is not None:
+        shader.uniform_sampler("others", others)
+    shader.image("results", results)
+    for name, value in (("first", first), ("stop", stop), ("result", result)):
+        shader.uniform_int(name, (value,))
+    gpu.compute.dispatch(shader, 1, 1, 1)
+
+
+def add_patches(total: gpu.types.GPUTexture, count: int, added) -> None:
+    """Makes ``total`` the sum of the arrays ``added`` of ``count`` patches, in their order."""
+    for number, texture in enumerate(added):
+        shader = program("patch_add_comp")
+        shader.uniform_sampler("added", texture)
+        shader.image("total", total)
+        shader.uniform_int("patch_count", (count,))
+        shader.uniform_int("begins", (int(number == 0),))
+        dispatch_linear(shader, count)

@@ -19,15 +19,14 @@ import numpy as np
 from ..core.errors import InputError
 from ..core.grid import Grid
 from ..core.patches import MOST_ROUNDS, NO_PATCH, NOTHING, POINTS, VARIANTS, CellRule, coarser_by
-from .dispatch import dispatch_linear
+from .dispatch import COMPACTION_BLOCK, dispatch_linear
 from .growing_array import GrowingArray
 from .programs import program
 from .scene_textures import SceneTextures
 from .textures import allocate, allocate_integers, read, upload
 
 _FREE, _NOBODY = 0, 0xFFFFFFFF
-_BLOCK = 4096  # entries of a compaction that a group takes, see patch_select_lib.glsl
-_FEW = 1 << 16  # hits: below, room for as many patches is made unasked, and hits are not listed
+_FEW = 1 << 14  # hits: below, room for as many patches is made unasked, and hits are not listed
 _MOST_PLACES = 1 << 24  # of the table: their numbers are kept as float32
 
 
@@ -148,12 +147,12 @@ class PatchFinder:
 
     def _number(self, bind: _Bind, items, item_count: int, variant: int) -> None:
         """Makes patches of the cells that were claimed."""
-        counts = self._compact("patch_count_comp", bind, items, item_count, leaders=True)
+        counts = self._compact("compact_count_comp", bind, items, item_count, leaders=True)
         entries = bind.entries(item_count)
         if entries <= _FEW:
-            self._reserve(self.count + (variant + 1) * entries)
+            self._reserve(self.count + bind.count)  # a hit leads one patch at most
         else:
-            blocks = -(-entries // _BLOCK)
+            blocks = -(-entries // COMPACTION_BLOCK)
             known = _number_in(self._totals[0])
             self._reserve(known + int(read(counts, blocks, channels=1).sum()))
         shader = self._compaction("patch_number_comp", bind, items, item_count, leaders=True)
@@ -171,7 +170,7 @@ class PatchFinder:
         ):
             shader.image(name, texture)
         shader.uniform_int("variant", (variant,))
-        gpu.compute.dispatch(shader, -(-entries // _BLOCK), 1, 1)
+        gpu.compute.dispatch(shader, -(-entries // COMPACTION_BLOCK), 1, 1)
         self._totals.reverse()
 
     def _join(self, bind: _Bind, items, item_count: int, first_new: int, before, last: bool) -> None:
@@ -203,7 +202,7 @@ class PatchFinder:
 
     def _pending(self, bind: _Bind, items, item_count: int) -> tuple[gpu.types.GPUTexture, int]:
         """The hits that are still without a patch, in order."""
-        counts = self._compact("patch_count_comp", bind, items, item_count)
+        counts = self._compact("compact_count_comp", bind, items, item_count)
         entries = bind.entries(item_count)
         listed = allocate(entries, "hits", "R32F")
         total = gpu.types.GPUTexture((1, 1), format="R32F")
@@ -211,12 +210,12 @@ class PatchFinder:
         shader.uniform_sampler("block_counts", counts)
         shader.image("total_out", total)
         shader.image("pending", listed)
-        gpu.compute.dispatch(shader, -(-entries // _BLOCK), 1, 1)
+        gpu.compute.dispatch(shader, -(-entries // COMPACTION_BLOCK), 1, 1)
         return listed, _number_in(total)
 
     def _compact(self, name: str, bind: _Bind, items, item_count: int, leaders: bool = False):
         shader = self._compaction(name, bind, items, item_count, leaders)
-        blocks = -(-bind.entries(item_count) // _BLOCK)
+        blocks = -(-bind.entries(item_count) // COMPACTION_BLOCK)
         counts = allocate(blocks, "hits", "R32F")
         shader.image("block_counts", counts)
         gpu.compute.dispatch(shader, blocks, 1, 1)

@@ -20,11 +20,11 @@ from ..core.settings import BakeSettings
 from ..core.steps import Pace, Steps, run
 from .dispatch import dispatch_linear
 from .growing_array import GrowingArray, copy_elements
-from .patch_direct import PatchDirect
+from .patch_direct import PatchDirect, add_patches, reduce_patches
 from .patch_finder import PatchFinder
 from .programs import program
 from .scene_textures import SceneTextures
-from .textures import allocate, read, upload
+from .textures import allocate, numbers, read, upload
 
 _RAYS_AT_ONCE = 1 << 20
 _UNSEEN = 1e-6  # weight of patches that no probe sees where iterations are compared: light may still be on its way
@@ -48,6 +48,7 @@ class PatchLight:
         self.world_texels = world_texels
         self._direct = PatchDirect(scene, settings, pace)
         self._change = gpu.types.GPUTexture((1, 1), format="RGBA32F")
+        self._brightest: float | None = None  # of the light that bounces begin with, where it is known
 
     @property
     def count(self) -> int:
@@ -63,21 +64,31 @@ class PatchLight:
         if self._direct.count == 0:
             self._direct.effort = effort(self.count, self._settings.samples)
         yield from self._direct.add(self.patches.points, self.count)
+        self._brightest = None
 
     def light_again(self, changed: np.ndarray, emitters: bool) -> Steps[int]:
         """Direct light of all patches where lamps ``changed`` (lamp_count,) bool, or sampled ``emitters`` did, in
         steps. Returns the number of lamps that were computed."""
-        return self._direct.again(self.patches.points, changed, emitters)
+        lamps = yield from self._direct.again(self.patches.points, changed, emitters)
+        self._brightest = None
+        return lamps
 
     @property
     def direct(self) -> gpu.types.GPUTexture:
         """Irradiance by lamps and sampled emitters, an element a patch."""
         return self._direct.texture
 
-    @property
-    def source(self) -> np.ndarray:
-        """(N, 4) irradiance that bounces begin with: direct, and brought along by rays."""
-        return self._direct.values + self._brought_values
+    def changed_source(self, before: gpu.types.GPUTexture) -> float:
+        """By how much the irradiance that bounces begin with, direct and brought along, differs from ``before``, as a
+        share of what it is now (of the root of its squares)."""
+        energy, change = self._compare(self.source(), before, before)[:2]
+        return float(np.sqrt(change / energy)) if energy else float(change > 0)
+
+    def source(self) -> gpu.types.GPUTexture:
+        """A copy of the irradiance that bounces begin with, an element a patch."""
+        total = allocate(self.count, "patches")
+        add_patches(total, self.count, (self.direct, self._brought.texture))
+        return total
 
     # Rays
     # ------------------------------------------------------------------------------------------------------------------
@@ -99,7 +110,6 @@ class PatchLight:
             if stop == self.count:
                 break
         yield from self.light_new_patches()
-        self._carry()
         self._irradiance = [allocate(self.count, "patches") for _ in range(STATES)]
         yield
 
@@ -111,17 +121,12 @@ class PatchLight:
         before = self._reflecting()
         for _ in self._trace_patches(0, self.count):
             yield
-        if (self._reflecting() != before).any():
-            return False
-        self._carry()
-        return True
+        self._brightest = None
+        return not (self._reflecting() != before).any()
 
     def _reflecting(self) -> np.ndarray:
         """(rays,) bool: does light come back?"""
         return read(self._reflected.texture, self.count * self._rays_each)[:, :3].any(axis=1)
-
-    def _carry(self) -> None:
-        self._brought_values = read(self._brought.texture, self.count)
 
     def _trace_patches(self, start: int, stop: int) -> Iterator[tuple[int, _Rays]]:
         """The rays of patches ``start`` .. ``stop``, part by part: number of the first ray, what the part found."""
@@ -206,10 +211,12 @@ class PatchLight:
             self._irradiance[0],
             bounce,
         )
-        brightest = float(np.abs(self.source[:, :3]).max(initial=0.0))
-        scale = 1.0 / brightest if 0.0 < brightest < 1e37 else 1.0  # light that is not finite is found by its sums
+        return self._compare(*self._irradiance[:3])
+
+    def _compare(self, new, old, older) -> tuple[float, float, float, float]:
+        scale = self._scale()
         shader = program("patch_change_comp")
-        for name, texture in zip(("irradiance_new", "irradiance_old", "irradiance_older"), self._irradiance):
+        for name, texture in (("irradiance_new", new), ("irradiance_old", old), ("irradiance_older", older)):
             shader.uniform_sampler(name, texture)
         shader.uniform_sampler("patch_seen", self.patches.seen)
         shader.uniform_float("unseen", _UNSEEN)
@@ -219,6 +226,16 @@ class PatchLight:
         gpu.compute.dispatch(shader, 1, 1, 1)
         energy, change, overlap, luminance = read(self._change, 1)[0].tolist()
         return energy, change, overlap, luminance / scale
+
+    def _scale(self) -> float:
+        """What light is taken times before it is squared, so that neither dim nor bright light leaves the range of
+        floats."""
+        if self._brightest is None:
+            result = allocate(1, "patches", "R32F")
+            reduce_patches(self.direct, 0, self.count, result, 0, others=self._brought.texture)
+            self._brightest = float(read(result, 1, channels=1)[0, 0])
+        # light that is not finite is found by its sums
+        return 1.0 / self._brightest if 0.0 < self._brightest < 1e37 else 1.0
 
     def _bounce(
         self, direct, brought, reflected, ends, rays_each: int, count: int, target, bounce: bool = True
@@ -266,7 +283,8 @@ class PatchLight:
         rays_each = gather_rays(settings.samples)
         direct, result = allocate(count, "texels"), allocate(count, "texels")
         reflects = np.flatnonzero(read(hits, count)[:, 3] >= 0)
-        run(self._direct.light(hits, 1, reflects, settings.samples, direct, first_key))
+        chosen = numbers(reflects, "texels")
+        run(self._direct.light(hits, 1, chosen, len(reflects), settings.samples, direct, first_key))
         reflected, brought = allocate(count * rays_each, "rays"), allocate(count, "texels")
         rays = self._trace(hits, 1, 0, count, rays_each, reflected, brought, settings.gather, first_key)
         ends = self.patches.bind_ends(rays.hits, rays.count, MOST_ROUNDS - 1)

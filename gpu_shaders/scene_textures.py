@@ -7,18 +7,17 @@ float32.
 
 from __future__ import annotations
 
-import bpy
 import numpy as np
 
 from ..core import bvh
 from ..core.errors import InputError
 from ..core.scene_changes import SceneChanges, ShapeChange
-from ..core.snapshot import Image, Light, SceneSnapshot
+from ..core.snapshot import Light, SceneSnapshot
 from ..core.steps import Pace, Steps, run
+from .image_textures import send_images
 from .scatter import scatter_rows
-from .textures import ROW, upload
+from .textures import upload
 
-_EXTENSIONS = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2, "MIRROR": 3}
 _POINT, _SPOT, _SUN, _RECTANGLE, _ELLIPSE = range(5)
 _MOST_TRIANGLES = 1 << 24  # their numbers are kept as float32, which knows every whole number up to here
 
@@ -64,7 +63,7 @@ class SceneTextures:
             yield
         self.has_images = bool(snapshot.images)
         if self.has_images:
-            self._upload_images(*(yield from pace.in_background(_pack_images, snapshot.images)))
+            self._send_images(snapshot)
             yield
         self._suns = pack_lights([], self._origin)
         self.set_lights(snapshot.lights, self._origin)
@@ -164,11 +163,7 @@ class SceneTextures:
     def _send_images(self, snapshot: SceneSnapshot) -> None:
         self.has_images = bool(snapshot.images)
         if self.has_images:
-            self._upload_images(*_pack_images(snapshot.images))
-
-    def _upload_images(self, table: np.ndarray, texels: np.ndarray) -> None:
-        self._textures["image_table"] = upload(table, "images")
-        self._textures["image_texels"] = upload(texels, "image texels", "RGBA16F")
+            self._textures["image_table"], self._textures["image_texels"] = send_images(snapshot.images)
 
     @property
     def surface_defines(self) -> dict:
@@ -313,38 +308,3 @@ def pack_lights(lights: list[Light], origin: np.ndarray) -> np.ndarray:
                 cosine = np.cos(light.spot_size / 2)
                 row[5, :2] = cosine, 1 / max((1 - cosine) * light.spot_blend, 1e-6)
     return rows
-
-
-def _pack_images(images: list[Image]) -> tuple[np.ndarray, np.ndarray]:
-    """Table (I, 4) and texels (N, 4): each image starts a row, its mip levels follow one another."""
-    table = np.zeros((len(images), 4), np.float32)
-    parts, row = [], 0
-    for entry, image in zip(table, images):
-        level = np.asarray(image.pixels, np.float32)
-        height, width = level.shape[:2]
-        entry[:] = row, width, height, _EXTENSIONS[image.extension]
-        levels = [level.reshape(-1, 4)]
-        while max(level.shape[:2]) > 1:
-            level = _halve(level)
-            levels.append(level.reshape(-1, 4))
-        texels = np.concatenate(levels)
-        rows = -(-len(texels) // ROW)
-        parts.append(np.pad(texels, ((0, rows * ROW - len(texels)), (0, 0))))
-        row += rows
-    texels = np.minimum(np.concatenate(parts), 65504.0)
-    if bpy.app.version < (5, 0):  # which cuts off what does not fit a half float, and so darkens every image
-        texels = texels.astype(np.float16).astype(np.float32)
-    return table, texels
-
-
-def _halve(level: np.ndarray) -> np.ndarray:
-    """Next mip level: means over equal parts, sizes halved and rounded down, never below 1."""
-    for axis in (0, 1):
-        size = level.shape[axis]
-        if size > 1:
-            edges = np.arange(size // 2) * size // (size // 2)
-            sums = np.add.reduceat(level, edges, axis=axis)
-            shape = [1, 1, 1]
-            shape[axis] = -1
-            level = sums / np.diff(np.append(edges, size)).reshape(shape)
-    return level.astype(np.float32)

@@ -26,10 +26,11 @@ def upload(data: np.ndarray, what: str, pixel: str = "RGBA32F") -> gpu.types.GPU
 
 
 def numbers(values: np.ndarray, what: str) -> gpu.types.GPUTexture:
-    """``values`` (N,) as a linear array, in the first channel."""
-    rows = np.zeros((len(values), 4), np.float32)
-    rows[:, 0] = values
-    return upload(rows, what)
+    """``values`` (N,) as a linear array, one an element."""
+    rows = _rows(len(values), what)
+    padded = np.zeros(rows * ROW, np.float32)
+    padded[: len(values)] = values
+    return gpu.types.GPUTexture((ROW, rows), format="R32F", data=gpu.types.Buffer("FLOAT", padded.size, padded))
 
 
 def allocate(elements: int, what: str, pixel: str = "RGBA32F") -> gpu.types.GPUTexture:

@@ -83,7 +83,8 @@ class ImageTable:
         table = self._decoding(image)
         columns = min(width, max(1, round(width * min(1.0, MAX_EDGE / max(width, height)))))
         rows = min(height, max(1, round(height * min(1.0, MAX_EDGE / max(width, height)))))
-        covers = image.alpha_mode != "CHANNEL_PACKED"  # else the fourth channel has nothing to do with the other three
+        # A channel-packed fourth channel has nothing to do with the other three, and one of ones changes nothing.
+        covers = image.alpha_mode != "CHANNEL_PACKED" and encoded.shape[2] == 4 and bool((encoded[..., 3] != 1).any())
         bands = []
         for start in range(0, height, _CHUNK_ROWS):
             band = _to_rgba(encoded[start : start + _CHUNK_ROWS], table, image)
@@ -94,7 +95,7 @@ class ImageTable:
         if covers:
             alpha = pixels[..., 3:]
             np.divide(pixels[..., :3], alpha, out=pixels[..., :3], where=alpha > 0)
-        return np.nan_to_num(pixels, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
+        return pixels if np.isfinite(pixels).all() else np.nan_to_num(pixels, nan=0.0, posinf=0.0, neginf=0.0)
 
     def _decoding(self, image: bpy.types.Image) -> np.ndarray | None:
         """Table from byte to linear value, or None where Blender hands out linear values already."""
@@ -113,7 +114,7 @@ def _to_rgba(encoded: np.ndarray, table: np.ndarray | None, image: bpy.types.Ima
     rgba = np.ones((*encoded.shape[:2], 4), np.float32)
     colors = min(encoded.shape[2], 3)
     source = encoded[..., :colors] if colors == 3 else encoded[..., :1]
-    rgba[..., :3] = source if table is None else table[np.rint(np.clip(source, 0, 1) * 255).astype(np.uint8)]
+    rgba[..., :3] = source if table is None else table[(source * 255.0 + 0.5).astype(np.uint8)]
     if encoded.shape[2] == 4 and image.alpha_mode != "NONE":
         rgba[..., 3] = encoded[..., 3]
         if table is None and image.alpha_mode != "CHANNEL_PACKED":  # float images are stored premultiplied

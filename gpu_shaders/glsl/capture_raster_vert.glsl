@@ -23,7 +23,6 @@ void main()
   /* Clips at near_distance; the depth that is tested comes from the fragment stage, linear and so precise at any distance. */
   gl_Position = vec4(dot(position, right), dot(position, up), depth - 2.0 * near_distance, depth);
   gl_Layer = layer;
-  hit_offset = position;
   hit_triangle = float(index);
-  hit_barycentric = vec2(corner == 1 ? 1.0 : 0.0, corner == 2 ? 1.0 : 0.0);
+  hit_layer = float(layer);
 }

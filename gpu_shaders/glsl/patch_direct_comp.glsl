@@ -1,6 +1,6 @@
 /* Direct light of patches: irradiance of lamps and sampled emitters at `samples` places spread over the patch's points.
  *
- * Dispatch: RUNS threads an entry of `patches`, each takes SAMPLES_EACH of the samples; groups of 64. patch_mean_comp puts them together.
+ * Dispatch: RUNS threads an entry of `patches` from first_entry on, each takes SAMPLES_EACH of the samples; groups of 64. patch_mean_comp puts them together.
  * (A thread for all samples of a patch would be simpler, but software drivers end every loop of a thread that has gone round 65 535 times.)
  * The key of a number is (first_key + patch, light, seed); its index counts samples, so the points of a patch share one stratified sequence.
  * patch_points, POINTS elements a patch: position, packed normal. patches: index of a patch in x.
@@ -14,7 +14,7 @@ void main()
     return;
   }
   int first = (thread_number - entry * runs) * SAMPLES_EACH;
-  int patch_index = int(element(patches, entry).x);
+  int patch_index = int(element(patches, first_entry + entry).x);
   uvec3 key = uvec3(uint(first_key + patch_index), 0u, uint(seed));
   vec3 irradiance = vec3(0.0);
   for (int i = first; i < min(first + SAMPLES_EACH, samples); i++) {

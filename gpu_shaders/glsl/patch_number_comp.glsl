@@ -1,4 +1,4 @@
-/* Numbers new patches in the order of their leaders and enters them in the table; second step of a compaction, see patch_select_lib.
+/* Numbers new patches in the order of their leaders and enters them in the table; second step of a compaction, see compaction_lib.
  *
  * Dispatch: one group of 256 threads a block. total_in, total_out: number of patches before and after.
  */
@@ -14,7 +14,7 @@ void main()
   }
   number += count_selected(first).y;
   for (int i = 0; i < RUN; i++) {
-    int hit = item_hit(first + i);
+    int hit = item(first + i);
     if (is_selected(hit)) {
       int slot = int(element(slots, hit).x);
       vec4 key = element(hit_keys, hit);

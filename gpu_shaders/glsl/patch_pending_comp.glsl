@@ -1,4 +1,4 @@
-/* Lists the hits that are still without a patch, in order; second step of a compaction, see patch_select_lib.
+/* Lists the hits that are still without a patch, in order; second step of a compaction, see compaction_lib.
  *
  * Dispatch: one group of 256 threads a block.
  */
@@ -14,7 +14,7 @@ void main()
   }
   place += count_selected(first).y;
   for (int i = 0; i < RUN; i++) {
-    int hit = item_hit(first + i);
+    int hit = item(first + i);
     if (is_selected(hit)) {
       imageStore(pending, element_position(place), vec4(float(hit)));
       place++;

@@ -2,7 +2,7 @@
  * shadow rays.
  *
  * Dispatch: one thread a patch from first_patch on; groups of 64. Writes mean and standard deviation of the luminance of the points'
- * irradiance, counted from first_patch.
+ * irradiance.
  */
 
 void main()
@@ -26,5 +26,5 @@ void main()
   }
   float mean = sum / float(POINTS);
   float deviation = sqrt(max(squares / float(POINTS) - mean * mean, 0.0));
-  imageStore(spread, element_position(entry), vec4(mean, deviation, 0.0, 0.0));
+  imageStore(spread, element_position(patch_index), vec4(mean, deviation, 0.0, 0.0));
 }

@@ -14,7 +14,7 @@ from gridlight.core.patches import POINTS
 from gridlight.core.reference_bake import ReferenceBake
 from gridlight.core.reference_scene import Surfaces
 from gridlight.gpu_shaders.backend import GpuBackend
-from gridlight.gpu_shaders.textures import allocate, read, upload
+from gridlight.gpu_shaders.textures import allocate, numbers, read, upload
 from shader_runner import read_layers, run
 
 BACKGROUND = 1e29  # distances from here on
@@ -107,7 +107,8 @@ class Stages:
         hits = self.hits_texture()
         count = self.gpu.count * 6 * self.settings.face**2
         direct = allocate(count, "test")
-        steps.run(self.light._direct.light(hits, 1, np.flatnonzero(self.hits()[:, 3] >= 0), samples, direct))
+        lit = np.flatnonzero(self.hits()[:, 3] >= 0)
+        steps.run(self.light._direct.light(hits, 1, numbers(lit, "test"), len(lit), samples, direct))
         return read(direct, count)[:, :3].reshape(self.gpu.count, -1, 3)
 
     # Patches
@@ -136,10 +137,17 @@ class Stages:
         )
         return found[:, 0] > 0
 
+    def spread(self, part):
+        """(2, N) how unevenly ``part`` of the light lights the patches."""
+        result = allocate(self.light.count, "test", "RG32F")
+        self.light._direct.find_spread(part, self.light.patches.points, 0, self.light.count, result)
+        return read(result, self.light.count, channels=2).T
+
     def direct_of(self, patches, samples):
         """(C, 3) direct light of ``patches`` (C,) by so many samples."""
         direct = allocate(self.light.count, "test")
-        steps.run(self.light._direct.light(upload(self.points, "test"), POINTS, patches, samples, direct))
+        chosen = numbers(patches, "test")
+        steps.run(self.light._direct.light(self.light.patches.points, POINTS, chosen, len(patches), samples, direct))
         return read(direct, self.light.count)[patches, :3].astype(float)
 
     def direct(self):

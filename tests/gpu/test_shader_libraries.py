@@ -7,6 +7,7 @@ from gridlight.core import bvh, cubemap, direct_light, images, rays, sampling
 from gridlight.core import spherical_harmonics as sh
 from gridlight.core.snapshot import Image
 from gridlight.gpu_shaders import scene_textures, textures
+from gridlight.gpu_shaders.image_textures import send_images
 from shader_runner import run
 from small_scenes import all_lights, box
 
@@ -215,7 +216,7 @@ def test_direct_light(name):
 def test_images(extension, size):
     generator = np.random.default_rng(3)
     picture = Image("noise", generator.random((size[1], size[0], 4)).astype(np.float32), extension)
-    table, texels = scene_textures._pack_images([picture])
+    table, texels = send_images([picture])
     places = np.zeros((4000, 4), np.float32)
     places[:, :2] = generator.uniform(-2.5, 2.5, (4000, 2))
     places[:, 2] = generator.choice([0, 0.04, 0.11, 0.23, 0.6, 3.0], 4000)
@@ -226,8 +227,8 @@ def test_images(extension, size):
         inputs={"places": places},
         defines={"HAS_IMAGES": ""},
         textures_2d={
-            "image_table": textures.upload(table, "table"),
-            "image_texels": textures.upload(texels, "texels", "RGBA16F"),
+            "image_table": table,
+            "image_texels": texels,
             "triangle_corners": textures.upload(np.zeros((1, 4)), "none"),
             "materials": textures.upload(np.zeros((1, 4)), "none"),
             "triangle_attributes": textures.upload(np.zeros((1, 4)), "none"),

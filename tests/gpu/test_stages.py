@@ -132,7 +132,7 @@ def test_unevenness_of_patches():
     classes = []
     for part in light_parts(2, has_emitters=False):
         mean, deviation = stages.reference.light.spread(stages.points, numbers, part)
-        found = stages.light._direct.spread(part, upload(stages.points, "test"), 0, stages.light.count)
+        found = stages.spread(part)
         np.testing.assert_allclose(found, [mean, deviation], rtol=1e-3, atol=1e-3 * mean.mean())
         classes.append(direct_samples(deviation, float(mean.mean())))
     assert set(classes[0]) == {0, 1, 2} and set(classes[1]) == {0}, "each number of samples occurs"

@@ -1,4 +1,4 @@
-/* First step of a compaction, see patch_select_lib: the number of selected entries of each block.
+/* First step of a compaction, see compaction_lib: the number of selected entries of each block.
  *
  * Dispatch: one group of 256 threads a block.
  */
