@@ -112,6 +112,27 @@ def test_nothing_from_the_file_becomes_markup():
     assert text.count("&lt;script&gt;alert") >= 12
 
 
+def test_what_a_bake_says_of_its_error_is_told():
+    error = {
+        "target": 0.02,
+        "met": False,
+        "predicted": 0.0312,
+        "predicted_at_most": 0.035,
+        "parts": {"texels": 0.01, "noise": 0.0, "rest": 0.0, "bounces": 0.001, "floor": 0.029},
+        "between": None,
+        "passes": ["face 8, samples 1, 9 probes"],
+        "paths": 4096,
+        "stopped": EVIL,
+        "bands": {"1": 0, "2": 4, "3": 5},
+    }
+    text = report_html(a_report(volumes=[VolumeReport(a_field(), error=error)]))
+    Page(text)
+    assert EVIL not in text and all(part in text for part in ("3.12 %", "2.90 %", "unknown", "4 with 2, 5 with 3"))
+    silent = {"target": 0.02, "met": None, "predicted": None, "reason": EVIL}
+    text = report_html(a_report(volumes=[VolumeReport(a_field(), error=silent)]))
+    assert EVIL not in text and "Not estimated" in text
+
+
 def test_only_the_pages_own_script_may_run():
     text = report_html(a_report())
     script = re.search(r"<script>(.*)</script>", text, re.DOTALL).group(1)
