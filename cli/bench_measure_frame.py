@@ -16,14 +16,17 @@ from ..bake.job import drive
 from ..bake.session import BakeSession
 from ..core import camera as cameras
 from ..core.conventions import ACTIVE
+from ..core.errors import InputError
 from ..core.field import Field
+from ..core.grid import Grid
 from ..core.settings import BakeSettings
-from ..core.snapshot import SceneSnapshot
+from ..core.snapshot import Light, SceneSnapshot
 from ..core.view import View
 from ..gpu_shaders.context import ensure_context
 from ..gpu_shaders.dispatch_profile import limits, profiled
-from ..gpu_shaders.fence import Fence
+from ..gpu_shaders.live_field import LiveField
 from ..gpu_shaders.scene_textures import SceneTextures
+from ..gpu_shaders.textures import wait_for_gpu
 from ..gpu_shaders.viewport_field import FieldTextures
 from ..gpu_shaders.viewport_pass import Picture, ViewportPass
 from ..gpu_shaders.viewport_shading import Shading
@@ -56,17 +59,13 @@ def frame(request: dict, reporter, should_stop) -> None:
     grid = bench_scenes.grid_of(request["scene"], snapshot)
     settings = BakeSettings(**request["settings"])
     reporter.phase("bake")
-    live = LiveBake()
-    target = [Target(grid, None)]
-    started = time.perf_counter()
-    fields = _follow(live, snapshot, target, settings, math.inf)[0]
-    cold = time.perf_counter() - started
-    field = fields[grid.name]
+    live = _Following(snapshot, grid, settings)
+    view = _Views(snapshot, live.field)
+    live.lead(view)
     facts = facts_about(request["scene"], snapshot, grid)
-    facts["scene"] |= {"active": int((field.state == ACTIVE).sum()), "lights": len(snapshot.lights)}
-    report({**facts, "cold_bake_seconds": cold, "picture": [WIDTH, HEIGHT]})
-    view = _Views(snapshot, field)
-    _moves(request, live, snapshot, target, settings, view, ends, reporter, should_stop)
+    facts["scene"] |= {"active": int((live.field.state == ACTIVE).sum()), "lights": len(snapshot.lights)}
+    report({**facts, "cold_bake_seconds": live.cold_seconds, "picture": [WIDTH, HEIGHT]})
+    _moves(request["moves"], live, view, ends, reporter, should_stop)
     reporter.phase("where the time goes")
     _where_it_goes(snapshot, grid, settings, should_stop)
     reporter.phase("pictures")
@@ -74,24 +73,65 @@ def frame(request: dict, reporter, should_stop) -> None:
     reporter.finish()
 
 
-def _moves(request, live, snapshot, target, settings, view, ends: float, reporter, should_stop) -> None:
+def _moves(moves: int, live: _Following, view: _Views, ends: float, reporter, should_stop) -> None:
     """A light moves, and its light is followed: series of slices, of whole relights, of handing light to the view."""
-    reporter.phase("a light moves", request["moves"])
+    reporter.phase("a light moves", moves)
     series: dict[str, list[float]] = {}
     until = time.perf_counter() + 0.4 * (ends - time.perf_counter())
-    for move in range(request["moves"] + 2):
+    for move in range(moves + 2):
         if move == 2:
             series.clear()  # the first two compile shaders and fill caches
-        moved = with_moved_light(snapshot, move)
-        fields, slices = _follow(live, moved, target, settings, _SLICE_SECONDS)
+        slices = live.follow(move)
         _add(series, "slice", *slices)
         _add(series, "relight, sliced", sum(slices))
-        _add(series, "new light to the view", view.show(moved, fields))
+        _add(series, "new light to the view", live.lead(view))
         reporter.advance()
         if should_stop() or (move > 4 and time.perf_counter() > until):
             break
     for name, seconds in series.items():
         report({"run": name, **spread(seconds)})
+
+
+class _Following:
+    """The viewport's live light of one volume while its first lamp moves."""
+
+    def __init__(self, snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings):
+        self._snapshot, self._settings = snapshot, settings
+        self._lights = snapshot.lights
+        self._targets = [Target(grid, None)]
+        self._live = LiveBake()
+        self._lead: LiveField | None = None
+        self.cold_seconds = sum(self._work(snapshot, math.inf))
+
+    def follow(self, move: int) -> list[float]:
+        """Seconds of every slice until all probes have the light of lamp position ``move``."""
+        moved = with_moved_light(self._snapshot, move)
+        self._lights = moved.lights
+        return self._work(moved, _SLICE_SECONDS)
+
+    def lead(self, view: _Views) -> float:
+        """Brings lamps and the newest light to the view at once; seconds."""
+        start = time.perf_counter()
+        view.set_lights(self._lights)
+        if self._lead is None:
+            self._lead = LiveField(self._live.backend_of(self.field.grid.name), view.show(self.field))
+        self._lead.follow(1.0)
+        wait_for_gpu()
+        return time.perf_counter() - start
+
+    def _work(self, snapshot: SceneSnapshot, budget_s: float) -> list[float]:
+        self._live.follow(snapshot, self._targets, self._settings, time.perf_counter())
+        slices = []
+        while self._live.is_working:
+            start = time.perf_counter()
+            progress = self._live.step(budget_s)
+            wait_for_gpu()
+            slices.append(time.perf_counter() - start)
+            if self._live.message:
+                raise InputError(self._live.message)
+            for field in progress.fields.values():  # a whole bake, whose probes may stand elsewhere
+                self.field, self._lead = field, None
+        return slices
 
 
 def _pictures(view: _Views, ends: float, should_stop) -> None:
@@ -131,22 +171,6 @@ def _add(series: dict, name: str, *seconds: float) -> None:
     series.setdefault(name, []).extend(seconds)
 
 
-def _follow(live: LiveBake, snapshot, targets, settings, budget_s: float) -> tuple[dict, list[float]]:
-    """(fields, seconds of every slice) of following ``snapshot`` in slices of ``budget_s``; the GPU is waited for after
-    each."""
-    fence, slices = Fence(), []
-    live.follow(snapshot, targets, settings)
-    while True:
-        start = time.perf_counter()
-        fields = live.step(budget_s)
-        fence.wait()
-        slices.append(time.perf_counter() - start)
-        if fields:
-            return fields, slices
-        if live.message:
-            raise RuntimeError(live.message)
-
-
 class _Views:
     """The picture of the scene's camera, or of one in the volume, as the viewport draws it."""
 
@@ -155,23 +179,23 @@ class _Views:
         self._textures = SceneTextures(snapshot, self._origin, np.zeros(len(snapshot.triangles)))
         self._pass = ViewportPass(self._textures, self._origin, len(snapshot.object_names), snapshot.world)
         self._picture = Picture(WIDTH, HEIGHT)
-        self._fence = Fence()
         self._view = View.from_camera(snapshot.camera or cameras.suggest(field, WIDTH / HEIGHT), 0.05, 200.0)
 
-    def show(self, snapshot: SceneSnapshot, fields: dict) -> float:
-        """Sends lamps and fields; seconds."""
-        start = time.perf_counter()
-        self._textures.set_lights(snapshot.lights, self._origin)
-        self._pass.set_fields([FieldTextures(field, self._origin) for field in fields.values()])
-        self._fence.wait()
-        return time.perf_counter() - start
+    def set_lights(self, lights: list[Light]) -> None:
+        self._textures.set_lights(lights, self._origin)
+
+    def show(self, field: Field) -> FieldTextures:
+        """Shows ``field`` instead of what was shown."""
+        textures = FieldTextures(field, self._origin)
+        self._pass.set_fields([textures])
+        return textures
 
     def draw(self, mode: str = "FULL") -> float:
         """Draws one sample afresh; seconds."""
         self._picture.samples = 0
         start = time.perf_counter()
         self._pass.draw(self._picture, self._view, Shading(mode=mode), None)
-        self._fence.wait()
+        wait_for_gpu()
         return time.perf_counter() - start
 
 
@@ -180,12 +204,18 @@ def _where_it_goes(snapshot: SceneSnapshot, grid, settings: BakeSettings, should
     clock = PhaseClock()
     session = BakeSession(snapshot, grid, settings, clock, stopwatch=clock)
     drive(session.bake(), should_stop)
-    fence, moves = Fence(), iter(range(1, 1 << 30))
+    moves = iter(range(1, 1 << 30))
 
-    def relight() -> float:
+    def relight(whole: bool = False) -> float:
+        """Up to the field on the GPU, or ``whole``, up to the one that files hold."""
         start = time.perf_counter()
-        drive(session.relight(with_moved_light(snapshot, next(moves))), should_stop)
-        fence.wait()
+        for steps in (
+            session.relight(with_moved_light(snapshot, next(moves)), live=True),
+            session.show(),
+            *([session.finish()] if whole else []),
+        ):
+            drive(steps, should_stop)
+        wait_for_gpu()
         return time.perf_counter() - start
 
     first = [relight() for _ in range(2)]
@@ -194,13 +224,14 @@ def _where_it_goes(snapshot: SceneSnapshot, grid, settings: BakeSettings, should
     watched = [relight() for _ in range(count)]
     report(
         {
-            "run": "relight, whole, phases waited for",
+            "run": "relight, in one go",
             **spread(watched),
             "phases": {name: seconds / count for name, seconds in clock.phases.items()},
             "patches": session.backend.light.count,
             "iterations": session.result.iterations,
         }
     )
+    report({"run": "the same, field read back", **spread([relight(whole=True) for _ in range(count)])})
     device = limits()
     texel_layers = dict.fromkeys(("geometry", "albedo", "emission"), len(session._batches.nodes))
     with profiled(texel_layers) as costs:

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 
 from ..bake.result import Silent
 from ..bake.stopwatch import Stopwatch
-from ..gpu_shaders.fence import Fence
+from ..gpu_shaders.textures import wait_for_gpu
 
 # (phase of the reporter, phase of the stopwatch) -> name in tables
 _NAMES = {
@@ -20,9 +20,7 @@ _NAMES = {
     ("upload", "setup"): "hierarchy, upload",
     ("capture", "capture"): "capture",
     ("capture", "light"): "finding patches",
-    ("upload", "capture"): "capture",
-    ("upload", "light"): "direct light, bounces",  # of a relight
-    ("light", "light"): "rays, bounces",
+    ("light", "light"): "light of patches",
     ("light", "capture"): "capture",
     ("project", "light"): "field",
     ("gather", "light"): "gather",
@@ -36,15 +34,14 @@ class PhaseClock(Silent, Stopwatch):
     def __init__(self):
         Stopwatch.__init__(self, {})
         self.phases: dict[str, float] = {}
-        self._fence = Fence()
         self._now = ""
 
     @contextmanager
     def __call__(self, phase: str):
-        self._fence.wait()
+        wait_for_gpu()
         start = time.perf_counter()
         yield
-        self._fence.wait()
+        wait_for_gpu()
         spent = time.perf_counter() - start
         name = _NAMES.get((self._now, phase), f"{self._now}: {phase}")
         self.phases[name] = self.phases.get(name, 0.0) + spent

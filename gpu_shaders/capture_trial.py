@@ -13,7 +13,7 @@ from ..core.grid import Grid
 from ..core.settings import BakeSettings
 from ..core.snapshot import Material, SceneSnapshot, World
 from .backend import GpuBackend
-from .fence import Fence
+from .textures import wait_for_gpu
 
 METHODS = ("raster", "trace")
 _FACE = 16
@@ -45,7 +45,6 @@ class _Trial:
         self._backend = GpuBackend(_room(triangles), grid, BakeSettings(face=_FACE))
         nodes = np.arange(grid.count)
         self._backend.set_probes(nodes, grid.positions())
-        self._fence = Fence()
 
     def seconds(self, method: str, probes: int) -> float:
         """The fastest of a few captures after one that compiles and allocates."""
@@ -53,7 +52,7 @@ class _Trial:
         while len(times) < _LEAST_RUNS or (len(times) < _MOST_RUNS and sum(times) < _ENOUGH_SECONDS):
             start = time.perf_counter()
             self._backend.find_hits(0, probes, method)
-            self._fence.wait()
+            wait_for_gpu()
             times.append(time.perf_counter() - start)
         return min(times[1:])
 

@@ -16,8 +16,9 @@ import gpu
 import numpy as np
 
 from . import programs
-from .fence import Fence
+from .textures import wait_for_gpu
 
+_ENOUGH_SECONDS = 0.5
 _BYTES = {"RGBA32F": 16, "RG32F": 8, "R32F": 4, "RGBA16F": 8, "R32UI": 4, "R32I": 4}
 
 
@@ -55,7 +56,7 @@ def profiled(layers: dict[str, int]) -> Iterator[dict[str, DispatchCost]]:
     """Costs by shader of all compute dispatches inside the block. ``layers``: how many the images of these names have;
     Blender does not tell."""
     costs: dict[str, DispatchCost] = {}
-    fence, dispatch = Fence(), gpu.compute.dispatch
+    dispatch = gpu.compute.dispatch
 
     def observe(name: str, shader):
         return _Observed(name, shader) if name.endswith("_comp") else shader
@@ -64,10 +65,10 @@ def profiled(layers: dict[str, int]) -> Iterator[dict[str, DispatchCost]]:
         if not isinstance(shader, _Observed):
             dispatch(shader, x, y, z)
             return
-        fence.wait()
+        wait_for_gpu()
         start = time.perf_counter()
         dispatch(shader.shader, x, y, z)
-        fence.wait()
+        wait_for_gpu()
         cost = costs.setdefault(shader.name, DispatchCost())
         cost.seconds += time.perf_counter() - start
         cost.dispatches += 1
@@ -96,13 +97,12 @@ class DeviceLimits:
 
 def limits() -> DeviceLimits:
     """Measures the device; takes a tenth of a second to a second."""
-    fence = Fence()
     edge = 2048
     texels = [gpu.types.GPUTexture((edge, edge), format="RGBA32F") for _ in range(2)]
     for texture in texels:
         texture.clear(format="FLOAT", value=(1.0, 1.0, 1.0, 1.0))
     copy, arithmetic = programs.program("measure_copy_comp"), programs.program("measure_arithmetic_comp")
-    copies = 8
+    copies = 4
 
     def copying(times: int) -> None:
         for index in range(times):
@@ -116,26 +116,26 @@ def limits() -> DeviceLimits:
         arithmetic.uniform_float("factor", 0.99)
         gpu.compute.dispatch(arithmetic, width // 16, width // 16, 1)
 
-    nothing = _seconds(fence, lambda: computing(0, 16))
+    nothing = _seconds(lambda: computing(0, 16))
     rounds = 16
-    while (spent := _seconds(fence, lambda: computing(rounds), 1) - nothing) < 0.02 and rounds < 1 << 16:
+    while (spent := _seconds(lambda: computing(rounds), 1) - nothing) < 0.02 and rounds < 1 << 16:
         rounds *= 2
-    spent = _seconds(fence, lambda: computing(rounds), 3) - nothing
+    spent = _seconds(lambda: computing(rounds), 3) - nothing
     return DeviceLimits(
-        copy_bytes_per_second=32.0 * edge * edge * copies / (_seconds(fence, lambda: copying(copies)) - nothing),
+        copy_bytes_per_second=32.0 * edge * edge * copies / (_seconds(lambda: copying(copies)) - nothing),
         operations_per_second=32.0 * rounds * edge * edge / spent,
         wait_seconds=nothing,
     )
 
 
-def _seconds(fence: Fence, work, repeats: int = 7) -> float:
-    """Median seconds of ``work`` on the GPU."""
+def _seconds(work, most: int = 7) -> float:
+    """Median seconds of ``work`` on the GPU; slow devices repeat less."""
     work()
-    fence.wait()
-    times = []
-    for _ in range(repeats):
+    wait_for_gpu()
+    times: list[float] = []
+    while not times or (len(times) < most and sum(times) < _ENOUGH_SECONDS):
         start = time.perf_counter()
         work()
-        fence.wait()
+        wait_for_gpu()
         times.append(time.perf_counter() - start)
     return float(np.median(times))
