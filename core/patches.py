@@ -75,7 +75,7 @@ def light_parts(lamps: int, has_emitters: bool) -> list[Part]:
     """What sends direct light that is kept apart: each of ``lamps``, neighbours together where there are more than
     MOST_PARTS, and all sampled emitters."""
     size = max(-(-lamps // MOST_PARTS), 1)
-    parts = [(first, min(first + size, lamps)) for first in range(0, lamps, size)]
+    parts: list[Part] = [(first, min(first + size, lamps)) for first in range(0, lamps, size)]
     return [*parts, EMITTERS] if has_emitters else parts
 
 

@@ -169,7 +169,7 @@ class ReferenceLight:
         """(C, 3) irradiance of lamps and suns of the world by sample ``index`` of the sequences of ``keys`` (C, 3)."""
         total = np.zeros_like(point)
         visible = self.scene.visible if shadows else lambda origins, directions, limits: np.ones(len(origins), bool)
-        first, stop = (0, None) if part == ALL else part
+        first, stop = part if isinstance(part, tuple) else (0, None)
         for number, light in list(enumerate(self._all_lamps()))[first:stop]:
             u = sample_r2(light_keys(keys, number), index).astype(float)
             total += direct_light.irradiance(light, point + self.scene.origin, origin, normal, u, visible)

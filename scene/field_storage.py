@@ -41,7 +41,7 @@ def store_field(volume_object: bpy.types.Object, field: Field, scene_hash: str, 
     """Keeps ``field`` as the light of ``volume_object``, instead of what it had.
 
     Args:
-        scene_hash: of the scene that was baked, by ``formats.probe_metadata.scene_hash``; operators/stale.py compares it.
+        scene_hash: of the scene that was baked (``formats.probe_metadata``); operators/stale.py compares it.
         details: what is worth knowing about this bake but does not belong into probe files, such as times; plain JSON.
     """
     text = stored_text(volume_object)

@@ -44,7 +44,7 @@ def test_hours_of_use_hold_no_more_than_the_first_minute(person, seed):
 
 
 class BusyUser(User):
-    """Also moves lamps while the preview follows, walks through time, and loads other files."""
+    """Also moves lamps while the preview follows, and loads other files."""
 
     def __init__(self, person, seed):
         super().__init__(person, seed)
@@ -59,6 +59,10 @@ class BusyUser(User):
         self.said.append(act.__name__)
         yield from act()
         yield 0.05
+
+    def place(self):
+        if self.volumes():  # they may have been deleted, and placing says so
+            yield from super().place()
 
     def move_lights(self):
         lamps = [item for item in bpy.context.scene.objects if item.type == "LIGHT"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The manual does not contradict the program: links lead somewhere, and commands, options and files that it names exist."""
+"""The manual does not contradict the program: links lead somewhere; commands, options and files that it names exist."""
 
 import importlib
 import re
@@ -63,6 +63,6 @@ def test_make_targets_exist(page):
 
 @pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
 def test_files_that_are_named_exist(page):
-    pattern = r"`((?:%s|docs|scripts)/[\w/]+\.(?:py|glsl|md|txt))" % "|".join(ROOMS)
+    pattern = rf"`((?:{'|'.join(ROOMS)}|docs|scripts)/[\w/]+\.(?:py|glsl|md|txt))"
     for name in re.findall(pattern, page.read_text()):
         assert "NAME" in name or (ROOT / name).exists(), f"{page.name} names {name}"

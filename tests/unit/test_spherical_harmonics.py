@@ -49,8 +49,8 @@ def test_every_function_is_its_definition(l, m):
     )
 
 
-# A direction for every coefficient where it must be positive: written down by hand from the table in the architecture
-# page.
+# A direction for every coefficient where it must be positive: written down by hand from the table in
+# docs/conventions.md.
 POSITIVE = {
     "L00": (0, 0, 1),
     "L1m1": (0, 1, 0),
