@@ -6,7 +6,6 @@ from __future__ import annotations
 import gpu
 import numpy as np
 
-from ..core.images import HALF_MAX
 from ..core.snapshot import Image
 from .dispatch import dispatch_linear
 from .programs import program

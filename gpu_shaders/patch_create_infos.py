@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bindings of the shaders that find patches and choose which to light, see patch_finder.py and patch_direct.py. Same form
-as create_infos.py."""
+"""Bindings of the shaders that find patches and choose which to light: patch_finder.py, patch_direct.py. Same form as
+create_infos.py."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from gridlight.core.reference_light import bounce
 from gridlight.core.settings import BakeSettings
 from gridlight.core.snapshot import Light
 from gridlight.gpu_shaders.probe_views import sightings
-from gridlight.gpu_shaders.textures import read, upload
+from gridlight.gpu_shaders.textures import read
 from small_scenes import all_lights, bake, cluttered_room, frame, irradiance_at_nodes
 from stages import PatchesOfGpu, Stages
 
