@@ -9,9 +9,11 @@ from gridlight.bake.error_driven import ErrorDrivenBake
 from gridlight.bake.session import BakeSession
 from gridlight.core.error_budget import ErrorGoal
 from gridlight.core.grid import Grid
+from gridlight.core.panorama import panorama_irradiance
 from gridlight.core.path_check import NORMALS, PathCheck, irradiance_of
 from gridlight.core.settings import BakeSettings
 from gridlight.core.snapshot import Material, World
+from gridlight.core.world_suns import extract_suns
 from gridlight.gpu_shaders.probe_paths import ProbePaths
 from gridlight.gpu_shaders.scene_textures import SceneTextures
 from small_scenes import Silent, all_lights, box, cluttered_room, furnace, snapshot_of
@@ -22,6 +24,7 @@ NO_EMITTERS = 0.0
 
 def checked(snapshot, positions, paths, bounces=None):
     scene = SceneTextures(snapshot, GRID.center, np.full(len(snapshot.triangles), NO_EMITTERS))
+    scene.set_suns(extract_suns(snapshot.world)[1])
     check = PathCheck(len(positions))
     for half in (0, 1):
         directions, flux, _behind = ProbePaths(scene, snapshot, GRID, positions).trace(0, paths, bounces, half + 1)
@@ -47,6 +50,45 @@ def test_paths_see_the_sky():
     snapshot = replace(snapshot_of(box((5, 5, 5), (5.01, 5.01, 5.01))), world=World((1.0, 2.0, 3.0)))
     found = checked(snapshot, GRID.positions(), 512).irradiance
     np.testing.assert_allclose(found.mean(axis=(0, 1, 2)), np.pi * np.array([1, 2, 3]), rtol=0.01)
+
+
+def test_paths_see_the_sun_of_a_map():
+    """An even sky with one very bright spot: the integral over the map's own pixels."""
+    pixels = np.full((32, 64, 3), 0.2, np.float32)
+    pixels[22, 10] = 400.0, 300.0, 200.0
+    snapshot = replace(snapshot_of(box((5, 5, 5), (5.01, 5.01, 5.01))), world=World(map=pixels))
+    found = checked(snapshot, GRID.positions(), 512).irradiance.mean(axis=(0, 1))
+    # the lamp in the sun's place is a disc where the map has a square: half a percent
+    np.testing.assert_allclose(found, panorama_irradiance(pixels, NORMALS), rtol=0.01, atol=0.01)
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+def test_paths_see_an_emitter_sampled_or_not(sampled):
+    """A black room with a square plate that glows on both sides: its irradiance by a fine sum over the plate."""
+    plate = np.array(
+        [[[-0.2, -0.2, 0], [0.2, -0.2, 0], [0.2, 0.2, 0]], [[-0.2, -0.2, 0], [0.2, 0.2, 0], [-0.2, 0.2, 0]]]
+    )
+    materials = [Material("black", (0.0,) * 3), Material("plate", (0.0,) * 3, emission=(3.0, 2.0, 1.0))]
+    corners = np.concatenate([3 * box()[:, ::-1], plate])
+    material = [0] * 12 + [1] * 2
+    snapshot = snapshot_of(corners, material, materials, objects=material)
+    density = np.array([0.0] * 12 + [float(sampled) / 0.16] * 2)
+    places = GRID.positions()
+    scene = SceneTextures(snapshot, GRID.center, density)
+    check = PathCheck(len(places))
+    for half in (0, 1):
+        directions, flux, _behind = ProbePaths(scene, snapshot, GRID, places).trace(0, 4096, None, half)
+        check.add(half, directions, flux)
+    check.paths = 4096
+    at = np.stack(np.meshgrid(*2 * [(np.arange(64) + 0.5) / 160 - 0.2], [0.0]), axis=-1).reshape(-1, 3)
+    offset = at - places[:, None]
+    distance = np.linalg.norm(offset, axis=2)
+    towards = offset / distance[..., None]
+    solid_angle = np.abs(towards[..., 2]) / distance**2 * 0.16 / len(at)
+    expected = np.einsum("ks,ksn->kn", solid_angle, np.maximum(towards @ NORMALS.T, 0))[..., None] * [3.0, 2.0, 1.0]
+    found = check.irradiance.mean(axis=0)
+    assert np.sqrt(((found - expected) ** 2).mean() / (expected**2).mean()) < (0.02 if sampled else 0.15)
+    np.testing.assert_allclose(found.sum(), expected.sum(), rtol=0.02 if sampled else 0.1)
 
 
 def driven(snapshot, target, kept=(), **settings):
