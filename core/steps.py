@@ -61,13 +61,13 @@ class Pace:
             work(start, number)
             if self._seconds is not None:
                 self._wait()
-                self._learn(kind, number, time.perf_counter() - began)
+                self._learn(kind, number, self._seconds / max(time.perf_counter() - began, 1e-9))
             start += number
             yield
 
-    def _learn(self, kind: str, number: int, seconds: float) -> None:
-        fitting = number * self._seconds / max(seconds, 1e-9)
-        self._portion[kind] = max(1, int(min(fitting, _MOST_GROWTH * number)))
+    def _learn(self, kind: str, number: int, growth: float) -> None:
+        """``growth``: how many times ``number`` would have filled the step."""
+        self._portion[kind] = max(1, int(number * min(growth, _MOST_GROWTH)))
 
     def in_background(self, work: Callable[..., Result], *arguments: Any) -> Steps[Result]:
         """Returns ``work(*arguments)``, computed in a thread of its own while steps go by. It must touch neither
