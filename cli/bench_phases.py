@@ -18,6 +18,8 @@ from ..gpu_shaders.textures import wait_for_gpu
 _NAMES = {
     ("cull", "cull"): "cull",
     ("upload", "setup"): "hierarchy, upload",
+    ("upload", "cull"): "placement",
+    ("capture", "cull"): "placement",
     ("capture", "capture"): "capture",
     ("capture", "light"): "finding patches",
     ("light", "light"): "light of patches",
