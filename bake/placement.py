@@ -9,10 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core import clearance, relocation
-from ..core.conventions import INVALID
+from ..core import clearance, culling, relocation
+from ..core.conventions import ACTIVE, CULLED, INVALID
+from ..core.errors import InputError
 from ..core.grid import Grid
 from ..core.orientation import ShellVote, inside_solid
+from ..core.probe_edits import ProbeEdits
+from ..core.settings import BakeSettings
+from ..core.snapshot import SceneSnapshot
 from ..core.steps import Steps
 from ..gpu_shaders.backend import GpuBackend
 from ..gpu_shaders.probe_views import exits, sightings
@@ -69,6 +73,21 @@ class Placement:
         return result, bool(inside.all())
 
 
+def cull(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, edits: ProbeEdits) -> np.ndarray:
+    """(P,) uint8 states before capture: ACTIVE or CULLED.
+
+    Raises:
+        InputError: the user switched off every probe that lights anything.
+    """
+    state = np.full(grid.count, ACTIVE, np.uint8)
+    if not settings.keep_all:
+        state[~culling.needed_nodes(grid, snapshot.triangle_positions)] = CULLED
+    state[edits.disabled] = CULLED
+    if edits.disabled.any() and not (state == ACTIVE).any():
+        raise InputError(f"{grid.name}: every probe is switched off; bring some back with Reset in the Volume panel")
+    return state
+
+
 def place(
     placement: Placement, batches: Batches, backend: GpuBackend, grid: Grid, obstacles: Callable[[], np.ndarray]
 ) -> Steps[None]:
@@ -80,6 +99,16 @@ def place(
     yield from judge(placement, batches, backend)
     placement.misplaced = relocation.misplaced(placement.shares) & ~placement.by_hand
     yield from _relocate(placement, batches, backend, grid, obstacles)
+
+
+def judge_again(placement: Placement, batches: Batches, backend: GpuBackend) -> Steps[None]:
+    """``judge`` for other light on the same surfaces: where no probe sees a back face nothing is voted on."""
+    if (placement.shares[:, 3] > 0).any():
+        yield from judge(placement, batches, backend)
+        return
+    for index in range(batches.count):
+        yield from _statistics(batches, index, backend)
+    placement.shares = backend.read_shares()
 
 
 def judge(placement: Placement, batches: Batches, backend: GpuBackend) -> Steps[None]:

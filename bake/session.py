@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core import clearance, culling, dilation, gradients
+from ..core import clearance, dilation, gradients
 from ..core.change_reach import RASTER_SPREAD, grown
 from ..core.conventions import ACTIVE, CULLED, INVALID
 from ..core.errors import InputError
@@ -35,7 +35,7 @@ from .batches import Batches
 from .capture_choice import choose_capture
 from .convergence import MANY_MODES, Convergence
 from .deringing import dering_field
-from .placement import Placement, judge, place
+from .placement import Placement, cull, judge_again, place
 from .result import BakeResult, Relit, Reporter, check_scene
 from .stopwatch import Stopwatch
 
@@ -73,6 +73,7 @@ class BakeSession:
         self._stopwatch = stopwatch or Stopwatch({})
         self._stopwatch.seconds = self.result.seconds
         self._pace = pace or Pace(None)
+        self._obstacles_of: tuple[SceneSnapshot | None, np.ndarray] = (None, np.zeros((0, 3, 3)))
         self.unshown = np.zeros(0, bool)  # (S,): probes whose light has changed since ``show`` was there
         self._scene = scene
 
@@ -88,7 +89,9 @@ class BakeSession:
         result = self.result
         check_scene(self.snapshot, result)
         self._reporter.phase("cull")
-        self._state = yield from self._stopwatch.steps("cull", self._pace.in_background(self._cull))
+        self._state = yield from self._stopwatch.steps(
+            "cull", self._pace.in_background(cull, self.snapshot, self.grid, self.settings, self._edits)
+        )
         yield
         self._reporter.phase("upload")
         making = GpuBackend.make(self.snapshot, self.grid, self.settings, self._pace, self._scene)
@@ -111,20 +114,11 @@ class BakeSession:
         yield from self.show()
         yield from self.finish()
 
-    def _cull(self) -> np.ndarray:
-        """(P,) uint8 states before capture: ACTIVE or CULLED."""
-        state = np.full(self.grid.count, ACTIVE, np.uint8)
-        if not self.settings.keep_all:
-            state[~culling.needed_nodes(self.grid, self.snapshot.triangle_positions)] = CULLED
-        state[self._edits.disabled] = CULLED
-        if self._edits.disabled.any() and not (state == ACTIVE).any():
-            raise InputError(
-                f"{self.grid.name}: every probe is switched off; bring some back with Reset in the Volume panel"
-            )
-        return state
-
     def _obstacles(self) -> np.ndarray:
-        return clearance.obstacles(self.grid, self.snapshot)
+        """What probes keep clear of; found once per state of the scene."""
+        if self._obstacles_of[0] is not self.snapshot:
+            self._obstacles_of = (self.snapshot, clearance.obstacles(self.grid, self.snapshot))
+        return self._obstacles_of[1]
 
     def _stand_at_home(self) -> Steps[None]:
         """Puts the probes of all slots where they belong, with no light yet."""
@@ -334,7 +328,7 @@ class BakeSession:
             relit.patches_traced = light.count
             yield
         if not live:
-            yield from judge(self._placement, self._batches, self.backend)
+            yield from judge_again(self._placement, self._batches, self.backend)
             if self._placement.is_outdated:
                 return False
         small = light.changed_source(before) < _SMALL_CHANGE
@@ -380,7 +374,9 @@ class BakeSession:
     def _reshape(self, shape: ShapeChange, hierarchy: str, old_order: np.ndarray, had_emitters: bool) -> Steps[None]:
         """Texel surfaces for triangles that changed: captured where the change can be seen, kept elsewhere."""
         backend, batches, placement = self.backend, self._batches, self._placement
-        self._state = yield from self._stopwatch.steps("cull", self._pace.in_background(self._cull))
+        self._state = yield from self._stopwatch.steps(
+            "cull", self._pace.in_background(cull, self.snapshot, self.grid, self.settings, self._edits)
+        )
         again = placement.moved
         for index in range(batches.count) if batches.resident else ():
             surfaces = yield from batches.captured(index)

@@ -26,6 +26,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .triangles import bounds
+
 NODE_TEXELS = 7
 TRIANGLE_TEXELS = 3
 WIDTH = 4
@@ -59,7 +61,7 @@ class Hierarchy:
 def build(triangles: np.ndarray) -> Hierarchy:
     """Builds the hierarchy of ``triangles`` (T, 3, 3) float32, T ≥ 1, in the frame that the rays will use."""
     triangles = np.asarray(triangles, np.float32)
-    low, high = triangles.min(axis=1), triangles.max(axis=1)
+    low, high = bounds(triangles)
     order = np.argsort(morton_codes((low + high) * np.float32(0.5)), kind="stable")
     tree = _merge(low[order].T.copy(), high[order].T.copy())
     return _flatten(tree, order)

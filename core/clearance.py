@@ -17,6 +17,7 @@ import numpy as np
 
 from .grid import Grid
 from .snapshot import SceneSnapshot
+from .triangles import bounds
 
 CLEARANCE = 0.2  # cells, by the shortest edge
 NEAR = 0.02  # cells: probes nearer than this to a surface are moved
@@ -34,8 +35,9 @@ def obstacles(grid: Grid, snapshot: SceneSnapshot) -> np.ndarray:
     by_object = np.argsort(snapshot.object_index, kind="stable")
     present, first = np.unique(snapshot.object_index[by_object], return_index=True)
     if len(present):
-        low = np.minimum.reduceat(corners.min(axis=1)[by_object], first)
-        high = np.maximum.reduceat(corners.max(axis=1)[by_object], first)
+        low, high = bounds(corners)
+        low = np.minimum.reduceat(low[by_object], first)
+        high = np.maximum.reduceat(high[by_object], first)
         large[present] = np.linalg.norm(high - low, axis=1) > CLEARANCE * grid.cell_size().min()
     edges = np.roll(corners, -1, axis=1) - corners
     doubled_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
@@ -157,6 +159,7 @@ def _near_pairs(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Row of ``nodes`` and triangle of every pair whose bounds come nearer than twice ``reach`` metres: after a step
     away from one surface the next one counts."""
+    low_of, high_of = bounds(triangles)
     to_lattice = grid.world_to_lattice()
     row_of = np.full(grid.count, -1)
     row_of[nodes] = np.arange(len(nodes))
@@ -165,8 +168,9 @@ def _near_pairs(
     margin = most * np.linalg.norm(to_lattice[:, :3], axis=1)
     lattice = triangles @ to_lattice[:, :3].T + to_lattice[:, 3]
     resolution = np.array(grid.resolution)
-    first = np.maximum(np.ceil(lattice.min(axis=1) - margin), 0).astype(np.int64)
-    last = np.minimum(np.floor(lattice.max(axis=1) + margin), resolution - 1).astype(np.int64)
+    lowest, highest = bounds(lattice)
+    first = np.maximum(np.ceil(lowest - margin), 0).astype(np.int64)
+    last = np.minimum(np.floor(highest + margin), resolution - 1).astype(np.int64)
     near = np.flatnonzero((first <= last).all(axis=1))
     spans = (last - first + 1)[near]
     ends = np.cumsum(spans.prod(axis=1))
@@ -181,8 +185,8 @@ def _near_pairs(
         k = low[:, 2] + rank // (span[:, 0] * span[:, 1])
         row, triangle = row_of[i + resolution[0] * (j + resolution[1] * k)], near[which]
         row, triangle = row[row >= 0], triangle[row >= 0]
-        corners, place = triangles[triangle], positions[row]
-        close = ((corners.min(axis=1) - place < 2 * reach) & (place - corners.max(axis=1) < 2 * reach)).all(axis=1)
+        place = positions[row]
+        close = ((low_of[triangle] - place < 2 * reach) & (place - high_of[triangle] < 2 * reach)).all(axis=1)
         row, triangle = row[close], triangle[close]
         apart = np.linalg.norm(positions[row] - nearest_points(triangles[triangle], positions[row]), axis=1)
         found.append((row[apart < 2 * reach], triangle[apart < 2 * reach]))

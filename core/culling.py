@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from .grid import Grid
+from .triangles import bounds
 
 REACH = 0.5  # how far boundary cells reach beyond the box, in cells
 _PAIRS_AT_ONCE = 1 << 18  # bounds the memory of one overlap test to about 150 MB
@@ -23,9 +24,10 @@ _PAIRS_AT_ONCE = 1 << 18  # bounds the memory of one overlap test to about 150 M
 def needed_nodes(grid: Grid, triangles: np.ndarray) -> np.ndarray:
     """(P,) bool: the nodes of ``grid`` that light some of ``triangles`` (T, 3, 3), world metres."""
     local = _to_cell_space(grid, triangles)
+    low, high = bounds(local)
     near = occupied_cells(grid, local, REACH)
     needed = _corners_of(near)
-    outside = local[(local.min(axis=1) < -REACH).any(axis=1) | (local.max(axis=1) > _cells(grid) + REACH).any(axis=1)]
+    outside = local[(low < -REACH).any(axis=1) | (high > _cells(grid) + REACH).any(axis=1)]
     if len(outside):
         unserved = occupied_cells(grid, outside, np.inf) & ~near & ~_any_corner(needed)
         needed |= _corners_of(unserved)
@@ -40,7 +42,7 @@ def occupied_cells(grid: Grid, local: np.ndarray, reach: float) -> np.ndarray:
     """
     cells = _cells(grid)
     occupied = np.zeros(cells, bool)
-    low, high = local.min(axis=1), local.max(axis=1)
+    low, high = bounds(local)
     inside = ((high >= -reach) & (low <= cells + reach)).all(axis=1)
     local, low, high = local[inside], low[inside], high[inside]
     # A triangle that touches a cell's face belongs to the cells of both sides.
@@ -80,7 +82,8 @@ def triangles_overlap_boxes(triangles: np.ndarray, centres: np.ndarray, half_siz
     Separating axes: 3 box normals, the triangle's normal, 9 cross products of edges. Touching counts as overlap.
     """
     v = triangles - centres[:, None, :]
-    overlap = ((v.min(axis=1) <= half_sizes) & (v.max(axis=1) >= -half_sizes)).all(axis=1)
+    low, high = bounds(v)
+    overlap = ((low <= half_sizes) & (high >= -half_sizes)).all(axis=1)
     edges = np.roll(v, -1, axis=1) - v
     normal = np.cross(edges[:, 0], edges[:, 1])
     distance = np.abs(np.einsum("ni,ni->n", normal, v[:, 0]))

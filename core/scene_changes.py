@@ -14,6 +14,7 @@ import numpy as np
 
 from .bvh import morton_codes
 from .snapshot import NO_IMAGE, Image, Light, Material, SceneSnapshot, World
+from .triangles import bounds
 
 MOST_BOXES = 32  # around what changed, on each side; more follow the shape closer and cost more per texel
 _LIGHT_LABELS = {"name", "group", "dynamic"}  # say nothing about the light itself
@@ -232,7 +233,7 @@ def boxes_around(triangles: np.ndarray, most: int = MOST_BOXES) -> np.ndarray:
     space-filling curve."""
     if not len(triangles):
         return np.empty((0, 2, 3))
-    low, high = triangles.min(axis=1), triangles.max(axis=1)
+    low, high = bounds(triangles)
     order = np.argsort(morton_codes((low + high) / 2), kind="stable")
     count = min(most, len(order))
     starts = np.arange(count) * len(order) // count

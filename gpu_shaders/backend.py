@@ -29,7 +29,7 @@ from .patch_light import PatchLight
 from .programs import program
 from .raster_capture import RasterCapture
 from .scene_textures import SceneTextures
-from .textures import allocate, layers, numbers, read, upload
+from .textures import allocate, layers, numbers, read, scratch, upload
 
 _GROUP = 64  # threads that share a probe where its texels are summed
 # Kept images of texel surfaces. Albedo is 32 bit: in a bright room an error of 1e-4 in 0.99 is one of 1e-2 in the
@@ -132,7 +132,9 @@ class GpuBackend:
     def update(self, snapshot: SceneSnapshot, changes: SceneChanges) -> str:
         """Brings the scene to ``snapshot``; texel surfaces and patches stay what they are. Returns what became of the
         hierarchy, see SceneTextures.update."""
-        hierarchy = self.scene.update(snapshot, changes, sampling_density(snapshot, self.grid))
+        surfaces = changes.emission or changes.reflectance or changes.materials or changes.images
+        density = sampling_density(snapshot, self.grid) if changes.shape or surfaces else None
+        hierarchy = self.scene.update(snapshot, changes, density)
         if changes.shape:
             self._raster = None  # it knows where triangles lie
             self.object_count = max(len(snapshot.object_names), 1)
@@ -277,7 +279,7 @@ class GpuBackend:
     def _texel_hits(self, surfaces: Surfaces, start: int, count: int) -> gpu.types.GPUTexture:
         """Where texels meet surface, as one linear array."""
         shader = program("texel_hits_comp", FACE=self.face)
-        hits = allocate(count * 6 * self.face**2, "texels")
+        hits = scratch(count * 6 * self.face**2, "texels")
         shader.uniform_sampler("probe_slots", self.probe_slots)
         self.scene.bind(shader, "triangle_corners")
         for name in ("geometry", "albedo"):

@@ -7,7 +7,7 @@ import gpu
 
 from .dispatch import dispatch_linear
 from .programs import program
-from .textures import allocate, allocate_integers
+from .textures import allocate_integers, scratch
 
 
 def copy_elements(source: gpu.types.GPUTexture, target: gpu.types.GPUTexture, pixel: str, count: int, first: int = 0):
@@ -31,10 +31,10 @@ def fill_elements(target: gpu.types.GPUTexture, first: int, count: int, value: f
 
 
 class GrowingArray:
-    """``texture`` holds at least as many elements as were reserved; the new ones are zero, or ``fill`` where they are
-    integers."""
+    """``texture`` holds at least as many elements as were reserved; new ones are ``fill``, or of no defined content
+    without."""
 
-    def __init__(self, what: str, pixel: str = "RGBA32F", fill: int = 0):
+    def __init__(self, what: str, pixel: str = "RGBA32F", fill: int | None = None):
         self._what, self._pixel, self._fill = what, pixel, fill
         self.capacity = 0  # elements
         self.texture: gpu.types.GPUTexture | None = None
@@ -54,6 +54,10 @@ class GrowingArray:
         return self.texture
 
     def _allocate(self) -> gpu.types.GPUTexture:
+        if self._fill is None:
+            return scratch(self.capacity, self._what, self._pixel)
         if self._pixel == "R32UI":
             return allocate_integers(self.capacity, self._what, self._fill)
-        return allocate(self.capacity, self._what, self._pixel)
+        texture = scratch(self.capacity, self._what, self._pixel)
+        texture.clear(format="FLOAT", value=(float(self._fill),) * (4 if self._pixel.startswith("RGBA") else 1))
+        return texture

@@ -17,7 +17,7 @@ from .dispatch import COMPACTION_BLOCK, dispatch_linear
 from .growing_array import GrowingArray, fill_elements
 from .programs import program
 from .scene_textures import SceneTextures
-from .textures import allocate, read
+from .textures import read, scratch
 
 _SAMPLES_EACH = 16  # of one lamp, or of emitters, that a thread takes
 _LAMPS_AT_ONCE = 32  # that a thread takes
@@ -102,7 +102,7 @@ class PatchDirect:
         """Patches that were not lit, or with another number of samples than they should have."""
         self._find_mean_lights()
         kinds = [(part, index) for part in self._parts for index in range(len(SAMPLES))]
-        counts = allocate(max(len(kinds), 1), "patches", "R32F")
+        counts = scratch(max(len(kinds), 1), "patches", "R32F")
         lists = [self._list_due(self._parts[part], index, counts, row) for row, (part, index) in enumerate(kinds)]
         for (part, index), due, count in zip(kinds, lists, read(counts, len(kinds), channels=1)[:, 0].astype(int)):
             if count:
@@ -114,7 +114,7 @@ class PatchDirect:
     def _find_mean_lights(self) -> None:
         """What unevenness is held against: the mean light of all parts, by range of patches."""
         parts, ranges = list(self._parts.values()), self._together
-        sums = allocate(max(len(parts) * len(ranges), 1), "patches", "R32F")
+        sums = scratch(max(len(parts) * len(ranges), 1), "patches", "R32F")
         for row, (first, stop) in enumerate(ranges):
             for column, light in enumerate(parts):
                 reduce_patches(light.spread.texture, first, stop, sums, row * len(parts) + column)
@@ -127,7 +127,7 @@ class PatchDirect:
         """Patches that ``light`` should light with SAMPLES[index] and has not yet, marked as lit so; their number goes
         into element ``row`` of ``counts``."""
         blocks = max(-(-self.count // COMPACTION_BLOCK), 1)
-        block_counts, due = allocate(blocks, "patches", "R32F"), allocate(self.count, "patches", "R32F")
+        block_counts, due = scratch(blocks, "patches", "R32F"), scratch(self.count, "patches", "R32F")
         for name in ("compact_count_comp", "patch_due_comp"):
             shader = program(name, DUE=name == "compact_count_comp")
             shader.uniform_sampler("spread", light.spread.texture)
@@ -207,7 +207,7 @@ class PatchDirect:
     ) -> None:
         first_entry, count = some
         runs = -(-samples // samples_each)
-        sums = allocate(count * runs, "patches")
+        sums = scratch(count * runs, "patches")
         shader = program("patch_direct_comp", POINTS=points_each, SAMPLES_EACH=samples_each, **self._defines(part))
         self._bind(shader, part)
         shader.uniform_sampler("patches", chosen)

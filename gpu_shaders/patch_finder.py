@@ -23,7 +23,7 @@ from .dispatch import COMPACTION_BLOCK, dispatch_linear
 from .growing_array import GrowingArray
 from .programs import program
 from .scene_textures import SceneTextures
-from .textures import allocate, allocate_integers, read, upload
+from .textures import allocate_integers, read, scratch, upload
 
 _FREE, _NOBODY = 0, 0xFFFFFFFF
 _FEW = 1 << 14  # hits: below, room for as many patches is made unasked, and hits are not listed
@@ -42,8 +42,8 @@ class PatchFinder:
         self.count = 0
         self._keys = GrowingArray("patches")
         self._points = GrowingArray("patches")
-        self._seen = GrowingArray("patches", "R32F")
-        self._candidates = GrowingArray("patches", "R32UI", _NOBODY)
+        self._seen = GrowingArray("patches", "R32F", fill=0)
+        self._candidates = GrowingArray("patches", "R32UI", fill=_NOBODY)
         self._places = 0
         self._totals = [gpu.types.GPUTexture((1, 1), format="R32F") for _ in range(2)]
         self._totals[0].clear(format="FLOAT", value=(0.0,))
@@ -204,7 +204,7 @@ class PatchFinder:
         """The hits that are still without a patch, in order."""
         counts = self._compact("compact_count_comp", bind, items, item_count)
         entries = bind.entries(item_count)
-        listed = allocate(entries, "hits", "R32F")
+        listed = scratch(entries, "hits", "R32F")
         total = gpu.types.GPUTexture((1, 1), format="R32F")
         shader = self._compaction("patch_pending_comp", bind, items, item_count)
         shader.uniform_sampler("block_counts", counts)
@@ -216,7 +216,7 @@ class PatchFinder:
     def _compact(self, name: str, bind: _Bind, items, item_count: int, leaders: bool = False):
         shader = self._compaction(name, bind, items, item_count, leaders)
         blocks = -(-bind.entries(item_count) // COMPACTION_BLOCK)
-        counts = allocate(blocks, "hits", "R32F")
+        counts = scratch(blocks, "hits", "R32F")
         shader.image("block_counts", counts)
         gpu.compute.dispatch(shader, blocks, 1, 1)
         return counts
@@ -275,9 +275,9 @@ class _Bind:
     def __init__(self, hits: gpu.types.GPUTexture, count: int, row_length: int, view: dict):
         """``row_length``: hits in a row, whose neighbours lie side by side; ``view``: defines of texels."""
         self.hits, self.count, self.row_length, self.view = hits, count, row_length, view
-        self.keys = allocate(count, "hits")
-        self.slots = allocate(count, "hits", "R32F")
-        self.bound = allocate(count, "hits", "R32F")
+        self.keys = scratch(count, "hits")
+        self.slots = scratch(count, "hits", "R32F")
+        self.bound = scratch(count, "hits", "R32F")
 
     def entries(self, item_count: int) -> int:
         return self.count if item_count < 0 else item_count

@@ -24,7 +24,7 @@ from .patch_direct import PatchDirect, add_patches, reduce_patches
 from .patch_finder import PatchFinder
 from .programs import program
 from .scene_textures import SceneTextures
-from .textures import allocate, numbers, read, upload
+from .textures import allocate, numbers, read, scratch, upload
 
 _RAYS_AT_ONCE = 1 << 20
 _UNSEEN = 1e-6  # weight of patches that no probe sees where iterations are compared: light may still be on its way
@@ -86,7 +86,7 @@ class PatchLight:
 
     def source(self) -> gpu.types.GPUTexture:
         """A copy of the irradiance that bounces begin with, an element a patch."""
-        total = allocate(self.count, "patches")
+        total = scratch(self.count, "patches")
         add_patches(total, self.count, (self.direct, self._brought.texture))
         return total
 
@@ -152,7 +152,7 @@ class PatchLight:
         """``rays_each`` rays of each of ``count`` patches from ``first``, with ``points_each`` places in ``points``.
         What they reflect and bring along goes into arrays of all rays and of all patches."""
         rays = count * rays_each
-        hits, carried = (allocate(rays, "rays") for _ in range(2))
+        hits, carried = (scratch(rays, "rays") for _ in range(2))
         is_path = segments > 1
         defines = self._scene.surface_defines | (self._scene.light_defines if is_path else {})
         shader = program(
@@ -231,7 +231,7 @@ class PatchLight:
         """What light is taken times before it is squared, so that neither dim nor bright light leaves the range of
         floats."""
         if self._brightest is None:
-            result = allocate(1, "patches", "R32F")
+            result = scratch(1, "patches", "R32F")
             reduce_patches(self.direct, 0, self.count, result, 0, others=self._brought.texture)
             self._brightest = float(read(result, 1, channels=1)[0, 0])
         # light that is not finite is found by its sums
@@ -285,7 +285,7 @@ class PatchLight:
         reflects = np.flatnonzero(read(hits, count)[:, 3] >= 0)
         chosen = numbers(reflects, "texels")
         run(self._direct.light(hits, 1, chosen, len(reflects), settings.samples, direct, first_key))
-        reflected, brought = allocate(count * rays_each, "rays"), allocate(count, "texels")
+        reflected, brought = scratch(count * rays_each, "rays"), scratch(count, "texels")
         rays = self._trace(hits, 1, 0, count, rays_each, reflected, brought, settings.gather, first_key)
         ends = self.patches.bind_ends(rays.hits, rays.count, MOST_ROUNDS - 1)
         self._bounce(direct, brought, reflected, ends, rays_each, count, result)

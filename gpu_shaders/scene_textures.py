@@ -68,8 +68,9 @@ class SceneTextures:
         self._suns = pack_lights([], self._origin)
         self.set_lights(snapshot.lights, self._origin)
 
-    def update(self, snapshot: SceneSnapshot, changes: SceneChanges, emitter_density: np.ndarray) -> str:
-        """Brings the textures from the snapshot before to ``snapshot`` and sends only what ``changes`` ask for.
+    def update(self, snapshot: SceneSnapshot, changes: SceneChanges, emitter_density: np.ndarray | None) -> str:
+        """Brings the textures from the snapshot before to ``snapshot`` and sends only what ``changes`` ask for. The
+        density may be None where neither shape nor surfaces changed.
 
         Returns what became of the hierarchy: "kept", "refit" or "rebuilt". Triangles keep their numbers unless it is
         rebuilt.

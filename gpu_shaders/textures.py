@@ -33,9 +33,14 @@ def numbers(values: np.ndarray, what: str) -> gpu.types.GPUTexture:
     return gpu.types.GPUTexture((ROW, rows), format="R32F", data=gpu.types.Buffer("FLOAT", padded.size, padded))
 
 
+def scratch(elements: int, what: str, pixel: str = "RGBA32F") -> gpu.types.GPUTexture:
+    """Linear array of ``elements`` without defined content, all of which is written before it is read."""
+    return gpu.types.GPUTexture((ROW, _rows(elements, what)), format=pixel)
+
+
 def allocate(elements: int, what: str, pixel: str = "RGBA32F") -> gpu.types.GPUTexture:
     """Linear array of ``elements`` zeros."""
-    texture = gpu.types.GPUTexture((ROW, _rows(elements, what)), format=pixel)
+    texture = scratch(elements, what, pixel)
     texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
     return texture
 
