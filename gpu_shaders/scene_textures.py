@@ -19,6 +19,7 @@ from .scatter import scatter_rows
 from .textures import upload
 
 _POINT, _SPOT, _SUN, _RECTANGLE, _ELLIPSE = range(5)
+_STACK_STEP = 8  # sizes of traversal stacks are multiples of it, so that most edits of a scene need no new shaders
 _MOST_TRIANGLES = 1 << 24  # their numbers are kept as float32, which knows every whole number up to here
 
 
@@ -169,7 +170,8 @@ class SceneTextures:
     @property
     def surface_defines(self) -> dict:
         """For shaders that ask what surfaces are made of, and may trace rays."""
-        return {"HAS_ALPHA": self.has_alpha, "HAS_IMAGES": self.has_images, "STACK_SIZE": self.hierarchy.stack_size}
+        stack_size = -(-self.hierarchy.stack_size // _STACK_STEP) * _STACK_STEP
+        return {"HAS_ALPHA": self.has_alpha, "HAS_IMAGES": self.has_images, "STACK_SIZE": stack_size}
 
     @property
     def ray_defines(self) -> dict:

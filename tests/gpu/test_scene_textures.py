@@ -22,6 +22,20 @@ def test_too_many_triangles_are_refused_in_one_line():
         SceneTextures(huge, np.zeros(3), np.zeros(count))
 
 
+def test_a_growing_scene_needs_few_shaders():
+    """Each size of the stack is a set of programs, which stay for the session and take seconds to compile."""
+    generator = np.random.default_rng(3)
+    needed, given = [], []
+    for count in (1, 3, 10, 30, 100, 300):
+        boxes = [box(place, place + 0.1) for place in generator.uniform(-1, 1, (count, 3))]
+        snapshot = snapshot_of(np.concatenate(boxes))
+        scene = SceneTextures(snapshot, np.zeros(3), np.zeros(len(snapshot.triangles)))
+        needed.append(scene.hierarchy.stack_size)
+        given.append(scene.ray_defines["STACK_SIZE"])
+    assert all(size >= least for size, least in zip(given, needed, strict=True))
+    assert len(set(needed)) > 3 and len(set(given)) <= 3, (needed, given)
+
+
 def density(snapshot):
     """Some emitters, whose density depends on all of them."""
     values = np.where(snapshot.material_index == 3, 1.0 + snapshot.material_index % 2, 0.0)
