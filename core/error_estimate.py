@@ -24,7 +24,7 @@ from .conventions import ACTIVE, COSINE_LOBE, band_of
 from .field import Field
 from .gradients import per_cell
 
-_OF_DISAGREEMENT = 0.25
+_OF_DISAGREEMENT = 0.2
 _OF_SECOND_DIFFERENCE = 1.0 / 8.0
 
 
