@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """three.js's own bake of a probe grid, in headless Chromium on the same scene as GLB, for ``bench pareto``.
 
-Its lamps are what the export for three.js makes of the scene's: three.js has no area lights with shadows, a spot stands
-in for one. Its field is read through white cards, as its shader would light them.
+Its lamps are what the export for three.js makes of the scene's. It has no area lights with shadows: a spot of the same
+power stands in for one. Its field is read through white cards, as its shader would light them.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import tempfile
 from pathlib import Path
@@ -44,7 +45,9 @@ def three(request: dict, reporter, _should_stop) -> None:
         folder = Path(name)
         reporter.phase("export")
         export_glb(folder / "scene.glb")
-        _write(folder / "scene.json", describe(snapshot, axes, "scene.glb"))
+        about = describe(snapshot, axes, "scene.glb")
+        about["lamps"] = [_of_same_power(lamp) for lamp in about["lamps"]]
+        _write(folder / "scene.json", about)
         _write(
             folder / "request.json",
             {
@@ -81,6 +84,18 @@ def three(request: dict, reporter, _should_stop) -> None:
             }
         )
     reporter.finish()
+
+
+def _of_same_power(lamp: dict) -> dict:
+    """``lamp``; where it is a spot that stands in for a flat one, as bright as sends out the same power.
+
+    A flat lamp falls off as the cosine c, whose mean over the half sphere is 1/2. three.js's spot with full blend falls
+    off as smoothstep(cos angle, 1, c), whose mean is (1 − cos angle) / 2.
+    """
+    if lamp.get("stands_in_for") != "area":
+        return lamp
+    share = 1.0 - math.cos(lamp["angle"])
+    return {**lamp, "color": [value / share for value in lamp["color"]]}
 
 
 def _write(path: Path, value: dict) -> None:

@@ -235,7 +235,9 @@ def _part(part: dict) -> list[str]:
     lines += bench_table.columns(cells, left=3)
     if part.get("three"):
         three = part["three"]
-        lines.append(f"three.js r{three['revision']} on {three['device']}; spots stand in for its area lights")
+        lines.append(
+            f"three.js r{three['revision']} on {three['device']}; spots of the same power stand in for area lights"
+        )
     if part["left_out"]:
         lines.append(f"ours left out for lack of time: {'; '.join(part['left_out'])}")
     for limit, (ours, theirs) in (part.get("best") or {}).items():
