@@ -16,6 +16,7 @@ from .grid import Grid
 from .snapshot import SceneSnapshot
 
 PROBE_POINTS = 4096  # on emitters that each probe considers besides its texels
+EMITTER_BOXES = 8  # around all of them, by which points know that none is near
 PROBE_RAYS = 256  # that it sends to them
 _MOST_AREA_SHARE = 0.25  # of all surface: a scene that glows all over is resolved by any grid
 

@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..core import bvh
+from ..core.emitters import EMITTER_BOXES
 from ..core.errors import InputError
-from ..core.scene_changes import SceneChanges, ShapeChange
+from ..core.scene_changes import SceneChanges, ShapeChange, boxes_around
 from ..core.snapshot import Light, SceneSnapshot
 from ..core.steps import Pace, Steps, run
 from .image_textures import send_images
@@ -246,7 +247,8 @@ def _attributes(
 
 
 def _emitters(density: np.ndarray, corners: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """(E, 4) rows of emitter_lib's emitters for triangles (T, 3, 3) in leaf ``order`` (T,) with ``density`` (T,).
+    """(E + 2·EMITTER_BOXES, 4) rows of emitter_lib's emitters and the boxes around them, for triangles (T, 3, 3) in leaf
+    ``order`` (T,) with ``density`` (T,).
 
     They stand in the snapshot's order: which point a random number picks then does not depend on the hierarchy."""
     triangle = np.flatnonzero(density > 0)
@@ -257,7 +259,12 @@ def _emitters(density: np.ndarray, corners: np.ndarray, order: np.ndarray) -> np
     rows[:, 0] = triangle
     rows[:, 1] = np.cumsum(density[triangle] * area)
     rows[:, 2] = density[triangle]
-    return rows
+    parts = np.arange(len(triangle), dtype=np.float32) / np.float32(max(len(triangle), 1))
+    rows[:, 3] = np.minimum(np.searchsorted(rows[:, 1], parts, side="right"), max(len(triangle) - 1, 0))
+    boxes = np.zeros((EMITTER_BOXES, 2, 4), np.float32)
+    found = boxes_around(corners[triangle], EMITTER_BOXES)
+    boxes[..., :3] = np.resize(found, (EMITTER_BOXES, 2, 3)) if len(found) else 0.0
+    return np.concatenate([rows, boxes.reshape(-1, 4)])
 
 
 def _uv_scale(corners: np.ndarray, uvs: np.ndarray) -> np.ndarray:

@@ -1,6 +1,9 @@
 /* Emissive triangles sampled as lights; which ones and why: core/emitters.py.
  *
- * emitters, 1 element each: triangle, upper end of its share of the total power, probability density per m².
+ * emitters, 1 element each: triangle, upper end of its share of the total power, probability density per m²; and of as many equal parts of
+ * the total power, the emitter in which the part of this number begins: a search has only few to choose from (Chen and Asau, "On Generating
+ * Random Variates from an Empirical Distribution", AIIE Transactions 1974).
+ * After them EMITTER_BOXES boxes (lower, upper corner) that together hold all of them.
  * The candidate that is traced is chosen by resampling (Talbot, Cline and Egbert, "Importance Resampling for Global Illumination", EGSR
  * 2005): CANDIDATES points by power, one of them by what it would send here if nothing stood between.
  */
@@ -16,7 +19,9 @@ struct EmitterSample {
 
 int find_emitter(float u)
 {
-  int low = 0, high = emitter_count - 1;
+  int part = min(int(u * float(emitter_count)), emitter_count - 1);
+  int low = int(element(emitters, part).w);
+  int high = part < emitter_count - 1 ? int(element(emitters, part + 1).w) : emitter_count - 1;
   while (low < high) {
     int middle = (low + high) / 2;
     if (element(emitters, middle).y <= u) {
@@ -111,9 +116,24 @@ vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, 
   return best_irradiance * (total / (best_weight * float(CANDIDATES)));
 }
 
+bool is_emitter_in_reach(vec3 point)
+{
+  for (int i = 0; i < EMITTER_BOXES; i++) {
+    vec3 low = element(emitters, emitter_count + 2 * i).xyz, high = element(emitters, emitter_count + 2 * i + 1).xyz;
+    vec3 apart = max(max(low - point, point - high), vec3(0.0));
+    if (dot(apart, apart) <= emitter_reach * emitter_reach) {
+      return true;
+    }
+  }
+  return false;
+}
+
 /* Irradiance by a direction about the normal that finds an emitter within emitter_reach. */
 vec3 emitter_direction_irradiance(vec3 origin, vec3 normal, uvec3 key, int index)
 {
+  if (!is_emitter_in_reach(origin)) {
+    return vec3(0.0);
+  }
   vec3 direction = sample_cosine(normal, sample_r2(key + uvec3(0u, 0x3C6EF372u, 0u), index));
   Hit hit = trace_within(origin, direction, emitter_reach);
   if (hit.triangle < 0) {
