@@ -247,7 +247,7 @@ def _attributes(
 
 
 def _emitters(density: np.ndarray, corners: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """(E + 2·EMITTER_BOXES, 4) rows of emitter_lib's emitters and the boxes around them, for triangles (T, 3, 3) in leaf
+    """(E + 2·EMITTER_BOXES, 4) rows of emitter_lib's emitters and boxes around them, for triangles (T, 3, 3) in leaf
     ``order`` (T,) with ``density`` (T,).
 
     They stand in the snapshot's order: which point a random number picks then does not depend on the hierarchy."""
