@@ -3,7 +3,7 @@
 
 ``bake_steps`` is the whole job as a generator that yields between pieces of GPU work: ``run_bake`` drives it to the
 end, a timer can drive it step by step. Cancelling is not calling ``next`` again. What is to be relit later keeps its
-``session.BakeSession`` instead.
+session of ``block_session.open_session`` instead.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from ..core.grid import Grid
 from ..core.probe_edits import ProbeEdits
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
+from .block_session import open_session
 from .result import BakeResult, Reporter
-from .session import BakeSession
 
 
 def run_bake(
@@ -50,7 +50,7 @@ def bake_steps(
 
     ``edits``: probes that the user switched off or moved. Moved ones capture where they were put and are not relocated.
     """
-    yield from BakeSession(snapshot, grid, settings, reporter, edits, result).bake()
+    yield from open_session(snapshot, grid, settings, reporter, edits, result).bake()
 
 
 def drive(steps: Iterator[None], should_stop: Callable[[], bool]) -> None:

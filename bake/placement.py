@@ -9,14 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core import clearance, culling, relocation
-from ..core.conventions import ACTIVE, CULLED, INVALID
-from ..core.errors import InputError
+from ..core import clearance, relocation
 from ..core.grid import Grid
 from ..core.orientation import ShellVote, inside_solid
-from ..core.probe_edits import ProbeEdits
-from ..core.settings import BakeSettings
-from ..core.snapshot import SceneSnapshot
 from ..core.steps import Steps
 from ..gpu_shaders.backend import GpuBackend
 from ..gpu_shaders.probe_views import exits, sightings
@@ -34,6 +29,7 @@ class Placement:
     shares: np.ndarray  # (S, 4) of the sphere, see GpuBackend.read_shares
     misplaced: np.ndarray  # (S,) bool: worth moving, as seen from home
     went_back: np.ndarray  # (S,) bool: was moved, saw no light there and went home
+    light_elsewhere: bool = False  # probes of other blocks see light
 
     @classmethod
     def at_home(cls, grid: Grid, nodes: np.ndarray, by_hand_m: np.ndarray, obstacles: np.ndarray) -> Placement:
@@ -61,67 +57,67 @@ class Placement:
     @property
     def is_outdated(self) -> bool:
         """Do ``shares`` of other light ask to move probes that stand at home, or home those that moved?"""
-        candidates = relocation.misplaced(self.shares) & ~self.by_hand & (~self.misplaced | self.went_back)
+        candidates = self._misplaced_now() & ~self.by_hand & (~self.misplaced | self.went_back)
         return bool((candidates & ~self.moved).any() or (_in_the_dark(self.shares) & self.moved).any())
 
-    def states(self, state: np.ndarray) -> tuple[np.ndarray, bool]:
-        """(P,) ``state`` before capture with invalid probes marked; and whether all would be, in which case none is."""
-        inside = inside_solid(self.shares)
-        result = state.copy()
-        if not inside.all():
-            result[self.nodes[inside]] = INVALID
-        return result, bool(inside.all())
+    def remember_misplaced(self) -> None:
+        """Notes which probes are worth moving, as seen from home."""
+        self.misplaced = self._misplaced_now() & ~self.by_hand
+
+    def _misplaced_now(self) -> np.ndarray:
+        return relocation.misplaced(self.shares, self.light_elsewhere)
 
 
-def cull(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, edits: ProbeEdits) -> np.ndarray:
-    """(P,) uint8 states before capture: ACTIVE or CULLED.
+def vote(batches: Batches, backend: GpuBackend, for_others: bool = False) -> Steps[ShellVote]:
+    """What the probes see of objects' back faces, by the direct light of their patches. ``for_others``: of a block
+    among several, which must know whether anything is lit here."""
+    result = ShellVote(backend.object_count)
+    for index in range(batches.count):
+        surfaces = yield from batches.bound(index)
+        result.add(sightings(backend, surfaces))
+        if for_others:
+            backend.statistics(surfaces)
+        yield
+    if for_others:
+        result.sees_light = bool(backend.read_shares()[:, 2].any())
+    return result
 
-    Raises:
-        InputError: the user switched off every probe that lights anything.
-    """
-    state = np.full(grid.count, ACTIVE, np.uint8)
-    if not settings.keep_all:
-        state[~culling.needed_nodes(grid, snapshot.triangle_positions)] = CULLED
-    state[edits.disabled] = CULLED
-    if edits.disabled.any() and not (state == ACTIVE).any():
-        raise InputError(f"{grid.name}: every probe is switched off; bring some back with Reset in the Volume panel")
-    return state
 
-
-def place(
-    placement: Placement, batches: Batches, backend: GpuBackend, grid: Grid, obstacles: Callable[[], np.ndarray]
-) -> Steps[None]:
-    """Fills ``placement`` from texel surfaces captured at home and bound to patches: lights those and judges.
-
-    ``obstacles()`` (T, 3, 3): what to keep clear of.
-    """
-    yield from batches.stopwatch.steps("light", backend.light.light_new_patches())
-    yield from judge(placement, batches, backend)
-    placement.misplaced = relocation.misplaced(placement.shares) & ~placement.by_hand
-    yield from _relocate(placement, batches, backend, grid, obstacles)
+def judge(placement: Placement, batches: Batches, backend: GpuBackend, verdict: ShellVote) -> Steps[None]:
+    """What probes see as a whole. ``verdict``: the votes of all probes together."""
+    backend.set_shells(verdict.shells())
+    for index in range(batches.count):
+        yield from _statistics(batches, index, backend)
+    placement.shares = backend.read_shares()
+    placement.light_elsewhere = verdict.sees_light
 
 
 def judge_again(placement: Placement, batches: Batches, backend: GpuBackend) -> Steps[None]:
-    """``judge`` for other light on the same surfaces: where no probe sees a back face nothing is voted on."""
+    """Votes and judges for other light on the same surfaces: where no probe sees a back face nothing is voted on."""
     if (placement.shares[:, 3] > 0).any():
-        yield from judge(placement, batches, backend)
+        verdict = yield from vote(batches, backend)
+        yield from judge(placement, batches, backend, verdict)
         return
     for index in range(batches.count):
         yield from _statistics(batches, index, backend)
     placement.shares = backend.read_shares()
 
 
-def judge(placement: Placement, batches: Batches, backend: GpuBackend) -> Steps[None]:
-    """What probes see as a whole, by the direct light of their patches."""
-    vote = ShellVote(backend.object_count)
-    for index in range(batches.count):
-        surfaces = yield from batches.bound(index)
-        vote.add(sightings(backend, surfaces))
-        yield
-    backend.set_shells(vote.shells())
-    for index in range(batches.count):
-        yield from _statistics(batches, index, backend)
-    placement.shares = backend.read_shares()
+def place(
+    placement: Placement,
+    batches: Batches,
+    backend: GpuBackend,
+    grid: Grid,
+    obstacles: Callable[[], np.ndarray],
+    verdict: ShellVote,
+) -> Steps[None]:
+    """Fills ``placement`` from texel surfaces captured at home whose patches have direct light.
+
+    ``obstacles()`` (T, 3, 3): what to keep clear of.
+    """
+    yield from judge(placement, batches, backend, verdict)
+    placement.remember_misplaced()
+    yield from _relocate(placement, batches, backend, grid, obstacles)
 
 
 def _statistics(batches: Batches, index: int, backend: GpuBackend) -> Steps[None]:

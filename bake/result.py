@@ -5,13 +5,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from dataclasses import field as default
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from ..core.errors import InputError
 from ..core.field import Field
+from ..core.grid import Grid
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
-from ..gpu_shaders.scene_textures import SceneTextures
+
+if TYPE_CHECKING:  # shards are merged where there is no Blender
+    from ..gpu_shaders.scene_textures import SceneTextures
 
 
 class Reporter(Protocol):
@@ -92,3 +95,23 @@ def check_scene(snapshot: SceneSnapshot, result: BakeResult) -> None:
             f"scene '{snapshot.name}' has no light: no lamp, emission or world; the field is black. Add a light or "
             "enable its rendering"
         )
+
+
+def is_unsettled(result: BakeResult, settings: BakeSettings) -> bool:
+    """Did the light fail to settle where it should have? A number of bounces that was asked for is no failure."""
+    return settings.bounces is None and not result.converged
+
+
+def report_on(result: BakeResult, grid: Grid, settings: BakeSettings, reporter: Reporter) -> bool:
+    """Passes on what a bake or relight had to say; returns whether its light settled where it should have."""
+    for warning in result.warnings:
+        reporter.warn(warning)
+    for note in result.notes:
+        reporter.note(note)
+    if is_unsettled(result, settings):
+        reporter.warn(
+            f"{grid.name}: the light has not settled after {result.iterations} iterations; the files are "
+            "written and marked. Raise --tolerance, or darken materials that reflect all light"
+        )
+        return False
+    return True

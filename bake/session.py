@@ -17,253 +17,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core import clearance, dilation, gradients
 from ..core.change_reach import RASTER_SPREAD, grown
-from ..core.conventions import ACTIVE, CULLED, INVALID
-from ..core.errors import InputError
-from ..core.field import Field
-from ..core.grid import Grid
-from ..core.probe_edits import ProbeEdits
+from ..core.conventions import ACTIVE
 from ..core.scene_changes import SceneChanges, ShapeChange, compare
-from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
-from ..core.steps import Pace, Steps
-from ..gpu_shaders.backend import GpuBackend
+from ..core.steps import Steps
 from ..gpu_shaders.change_pass import new_numbers, probes_reached, resolve_again
-from ..gpu_shaders.scene_textures import SceneTextures
-from .batches import Batches
-from .capture_choice import choose_capture
-from .convergence import MANY_MODES, Convergence
-from .deringing import dering_field
-from .placement import Placement, cull, judge_again, place
-from .result import BakeResult, Relit, Reporter, check_scene
-from .stopwatch import Stopwatch
+from .placement import judge_again
+from .result import BakeResult, Relit, check_scene
+from .volume_bake import VolumeBake
 
 _SMALL_CHANGE = 0.5  # of the light that bounces begin with: above, the light before is no better start than the dark
 
 
-class BakeSession:
-    """``bake`` once, then ``relight`` as often as the scene changes; ``result`` is that of the last one. The bake fills
-    the one given.
-
-    ``edits``: probes that the user switched off or moved. Moved ones capture where they were put and are not relocated.
-    ``stopwatch``: one that measures more than seconds by phase.
-    """
-
-    def __init__(
-        self,
-        snapshot: SceneSnapshot,
-        grid: Grid,
-        settings: BakeSettings,
-        reporter: Reporter,
-        edits: ProbeEdits | None = None,
-        result: BakeResult | None = None,
-        stopwatch: Stopwatch | None = None,
-        pace: Pace | None = None,
-        scene: SceneTextures | None = None,
-    ):
-        """``pace``: how much is done in a step; without one steps are as large as they come. ``scene``: ``snapshot`` on
-        the GPU, from another session of the same grid."""
-        self.snapshot = snapshot
-        self.grid = grid
-        self.settings = settings
-        self.result = result or BakeResult()
-        self._reporter = reporter
-        self._edits = edits or ProbeEdits.none(grid)
-        self._stopwatch = stopwatch or Stopwatch({})
-        self._stopwatch.seconds = self.result.seconds
-        self._pace = pace or Pace(None)
-        self._obstacles_of: tuple[SceneSnapshot | None, np.ndarray] = (None, np.zeros((0, 3, 3)))
-        self.unshown = np.zeros(0, bool)  # (S,): probes whose light has changed since ``show`` was there
-        self._scene = scene
-
-    # The bake
-    # ------------------------------------------------------------------------------------------------------------------
-
-    def bake(self) -> Steps[None]:
-        """The whole bake in steps; fills ``result`` as it goes and completes it with the last step.
-
-        Raises:
-            InputError: the scene has no surface, or the grid does not fit the GPU.
-        """
-        result = self.result
-        check_scene(self.snapshot, result)
-        self._reporter.phase("cull")
-        self._state = yield from self._stopwatch.steps(
-            "cull", self._pace.in_background(cull, self.snapshot, self.grid, self.settings, self._edits)
-        )
-        yield
-        self._reporter.phase("upload")
-        making = GpuBackend.make(self.snapshot, self.grid, self.settings, self._pace, self._scene)
-        self.backend = yield from self._stopwatch.steps("setup", making)
-        yield
-        result.scene = self.backend.scene
-        result.capture, reason = choose_capture(
-            self.settings, self.backend.scene.triangle_count, int((self._state == ACTIVE).sum())
-        )
-        result.notes.append(reason)
-        nodes = np.flatnonzero(self._state == ACTIVE)
-        self._batches = Batches(self.backend, nodes, result.capture, self._stopwatch, self._pace)
-        if not self._batches.resident:
-            result.notes.append(
-                f"texel surfaces of {len(self._batches.nodes)} probes exceed the memory budget of "
-                f"{self.settings.memory_mib} MiB: they are captured again whenever they are needed"
-            )
-        yield from self._stand_at_home()
-        yield from self._light_from_texels()
-        yield from self.show()
-        yield from self.finish()
-
-    def _obstacles(self) -> np.ndarray:
-        """What probes keep clear of; found once per state of the scene."""
-        if self._obstacles_of[0] is not self.snapshot:
-            self._obstacles_of = (self.snapshot, clearance.obstacles(self.grid, self.snapshot))
-        return self._obstacles_of[1]
-
-    def _stand_at_home(self) -> Steps[None]:
-        """Puts the probes of all slots where they belong, with no light yet."""
-        nodes = self._batches.nodes
-
-        def at_home() -> Placement:
-            return Placement.at_home(self.grid, nodes, self._edits.offset, self._obstacles())
-
-        self._placement = yield from self._stopwatch.steps("cull", self._pace.in_background(at_home))
-        self.backend.set_probes(self._batches.nodes, self._placement.home)
-        self.backend.allocate_field()
-
-    def _light_from_texels(self) -> Steps[None]:
-        """Everything after capture, from nothing: patches, placement, bounces."""
-        result, batches = self.result, self._batches
-        self._reporter.phase("capture", len(batches.nodes))
-        for index in range(batches.count):
-            surfaces = yield from batches.bound(index)
-            self._reporter.advance(surfaces.count)
-            yield
-        yield from place(self._placement, batches, self.backend, self.grid, self._obstacles)
-        moved = int(self._placement.moved.sum())
-        if moved:
-            result.notes.append(f"{moved} probes in or behind walls were moved out, at most half a cell")
-        self._reporter.phase("light")
-        yield from self._stopwatch.steps("light", self.backend.light.connect())
-        result.notes.append(f"light bounces between {self.backend.light.count} patches of surface")
-        yield
-        yield from self._bounce(warm=False)
-        self._mark_unshown(emission=self.backend.scene.emitter_count > 0)
-
-    def light_with(self, settings: BakeSettings) -> Steps[None]:
-        """Lights what was baked once more with other ``settings`` of light, its seed among them, in steps: probes stay
-        where they are and see what they saw. ``result`` is a new one."""
-        self.settings = self.backend.settings = settings
-        self.result = BakeResult(scene=self.backend.scene, capture=self.result.capture)
-        self._stopwatch.seconds = self.result.seconds
-        self._batches.unbind()
-        self.backend.forget_patches()
-        self.backend.forget_emission()
-        for index in range(self._batches.count):
-            yield from self._batches.bound(index)
-        yield from self._stopwatch.steps("light", self.backend.light.light_new_patches())
-        yield from self._stopwatch.steps("light", self.backend.light.connect())
-        yield from self._bounce(warm=False)
-        self._mark_unshown(emission=self.backend.scene.emitter_count > 0)
-        yield from self.show()
-        yield from self.finish()
-
-    def _bounce(self, warm: bool) -> Steps[None]:
-        """Iterates until the light has settled, from the dark or from the light before."""
-        convergence = Convergence(self.settings.bounces, self.settings.tolerance)
-        while not convergence.done:
-            with self._stopwatch("light"):
-                energy, change, overlap, luminance = self.backend.light.iterate(
-                    bounce=warm or convergence.iterations > 0
-                )
-                self.result.energy.append(luminance)
-                factor = convergence.add(energy, change, overlap)
-                self._reporter.advance(1)
-                if factor == MANY_MODES:
-                    self.backend.light.extrapolate_modes()
-                elif factor:
-                    self.backend.light.extrapolate(factor)
-            yield
-        self.result.iterations = convergence.iterations
-        self.result.converged = convergence.converged
-        self.result.missing = convergence.missing
-        self.result.change = convergence.changes
-        self.result.notes.append(convergence.reason)
-
-    def _mark_unshown(self, emission: bool) -> None:
-        """The light of all probes has changed; with ``emission``, also what they see of sampled emitters."""
-        self.unshown = np.ones(len(self._batches.nodes), bool)
-        self._emission_unknown = np.full(len(self._batches.nodes), emission)
-
-    @property
-    def positions(self) -> np.ndarray:
-        """(S, 3) world metres: where probes capture."""
-        return self._placement.home + self._placement.step
-
-    def show(self, slots: np.ndarray | None = None) -> Steps[None]:
-        """The field of the probes in ``slots`` (L,), or of all, by the light of patches, or by a gather."""
-        batches, backend, kind = self._batches, self.backend, "gather" if self.settings.gather else "project"
-        slots = np.arange(len(batches.nodes)) if slots is None else slots
-        self._reporter.phase(kind, len(slots))
-        for index in range(batches.count):
-            mine = batches.slots_of(index, slots)
-            if not len(mine):
-                continue
-            surfaces = yield from batches.bound(index)
-
-            def project(start: int, number: int, mine=mine, surfaces=surfaces) -> None:
-                some = mine[start : start + number]
-                blind = some[self._emission_unknown[some]]
-                if len(blind):
-                    backend.find_emission(surfaces, blind - surfaces.first)
-                    self._emission_unknown[blind] = False
-                (backend.gather if self.settings.gather else backend.project)(surfaces, some - surfaces.first)
-                self.unshown[some] = False
-                self._reporter.advance(number)
-
-            yield from self._stopwatch.steps("light", self._pace.portions(kind, len(mine), project))
-
-    def finish(self) -> Steps[None]:
-        """Reads the field back and completes it for probes without light of their own."""
-        result, placement, backend = self.result, self._placement, self.backend
-        state, all_inside = placement.states(self._state)
-        if all_inside:
-            result.warnings.append(
-                f"{self.grid.name}: every probe sees mostly back faces without light; they are baked all the same. "
-                "Flip the normals of what surrounds the volume, or move it out of solid geometry"
-            )
-        with self._stopwatch("light"):
-            field = result.field = Field.empty(self.grid, self.settings.bands)
-            nodes = placement.nodes
-            field.state[:] = state
-            field.validity[nodes] = 1.0 - placement.shares[:, 0]
-            field.offset[:] = self._edits.offset
-            field.offset[nodes] = placement.home + placement.step - self.grid.positions()[nodes]
-            field.coefficients[nodes] = backend.read_field()
-            field.depth[nodes] = backend.read_depth()
-            field.gradient[nodes] = backend.read_gradient()
-        yield
-        notes = yield from self._stopwatch.steps("light", self._pace.in_background(self._complete, field))
-        result.notes += notes
-        result.counts = {"total": self.grid.count} | {
-            name: int((state == value).sum())
-            for name, value in (("active", ACTIVE), ("culled", CULLED), ("invalid", INVALID))
-        }
-        if not np.isfinite(field.coefficients).all():
-            raise InputError(
-                f"scene '{self.snapshot.name}' sends light that is not finite; look for lights or emission beyond 1e30"
-            )
-
-    def _complete(self, field: Field) -> list[str]:
-        """Light of nodes that have none of their own, and limits; returns what to say about it."""
-        active = field.state == ACTIVE
-        field.coefficients = dilation.fill(self.grid, field.coefficients, active)
-        field.gradient[~active] = 0.0
-        field.gradient = gradients.limited(self.grid, field.gradient, field.coefficients)
-        return [dering_field(field)] if self.settings.deringing else []
-
-    # Relighting
-    # ------------------------------------------------------------------------------------------------------------------
+class BakeSession(VolumeBake):
+    """``bake`` once, then ``relight`` as often as the scene changes; ``result`` is that of the last one."""
 
     def relight(self, snapshot: SceneSnapshot, live: bool = False) -> Steps[None]:
         """Brings the bake to ``snapshot``, another state of the scene, in steps; ``result`` is a new one, with
@@ -348,13 +116,9 @@ class BakeSession:
     def _light_anew(self) -> Steps[None]:
         """Light from texel surfaces on; probes that had been moved capture at home first, where placement begins."""
         relit = self.result.relit
-        moved = np.flatnonzero(self._placement.moved)
-        yield from self._stand_at_home()
-        self._batches.unbind()
-        yield from self._batches.capture_again(moved)
-        self.backend.forget_patches()
-        yield
-        yield from self._light_from_texels()
+        yield from self._go_home()
+        verdict = yield from self.see()
+        yield from self.settle(verdict)
         relit.patches_lit = relit.patches_traced = self.backend.light.count
         relit.lights_direct = self.backend.scene.lamp_count
 
@@ -375,7 +139,7 @@ class BakeSession:
         """Texel surfaces for triangles that changed: captured where the change can be seen, kept elsewhere."""
         backend, batches, placement = self.backend, self._batches, self._placement
         self._state = yield from self._stopwatch.steps(
-            "cull", self._pace.in_background(cull, self.snapshot, self.grid, self.settings, self._edits)
+            "cull", self._pace.in_background(self._cull)
         )
         again = placement.moved
         for index in range(batches.count) if batches.resident else ():

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 
 from ..core.errors import InputError
 
@@ -23,6 +24,13 @@ SIGNED_OPTIONS = (
     "--bands",
     "--face",
     "--memory",
+    "--block",
+    "--frames",
+    "--shards",
+    "--shard",
+    "--iteration",
+    "--workers",
+    "--timeout",
     "--resolution",
     "--points",
     "--spp",
@@ -124,3 +132,12 @@ def bounces(text: str) -> int | None:
         return int(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"'{text}' is neither a whole number nor auto") from None
+
+
+def frames(text: str) -> list[int]:
+    """``A-B``, both included; either may be negative."""
+    found = re.fullmatch(r"(-?\d+)-(-?\d+)", text)
+    first, last = map(int, found.groups()) if found else (1, 0)
+    if last < first:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a range of frames A-B")
+    return list(range(first, last + 1))

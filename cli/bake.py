@@ -26,11 +26,7 @@ def add_arguments(parser, in_blender: bool) -> None:
     else:
         parser.add_argument("file", metavar="FILE.blend")
     parser.add_argument("-o", "--output", metavar="DIR", required=True, help="folder for the results")
-    volume = parser.add_argument_group("volume (default: those of the file, or one fitted to the scene)")
-    volume.add_argument("--min", metavar="X,Y,Z", type=arguments.point, help="corner of an axis-aligned volume, metres")
-    volume.add_argument("--max", metavar="X,Y,Z", type=arguments.point, help="the opposite corner")
-    volume.add_argument("--resolution", metavar="NX,NY,NZ", type=arguments.counts, help="probes per axis, 1 to 256")
-    volume.add_argument("--spacing", metavar="M", type=arguments.length, help="or the distance between probes, metres")
+    add_volume(parser)
     add_goal(parser)
     add_settings(parser)
     parser.add_argument("--frame", metavar="N", type=int, help="frame to bake (default: the file's current one)")
@@ -42,6 +38,15 @@ def add_arguments(parser, in_blender: bool) -> None:
         help="afterwards light another state of the scene, a file or a frame, computing only what changed; repeatable",
     )
     parser.add_argument("--quiet", action="store_true", help="no progress; warnings stay")
+
+
+def add_volume(parser) -> None:
+    """The options from which ``choose_grids`` makes grids."""
+    volume = parser.add_argument_group("volume (default: those of the file, or one fitted to the scene)")
+    volume.add_argument("--min", metavar="X,Y,Z", type=arguments.point, help="corner of an axis-aligned volume, metres")
+    volume.add_argument("--max", metavar="X,Y,Z", type=arguments.point, help="the opposite corner")
+    volume.add_argument("--resolution", metavar="NX,NY,NZ", type=arguments.counts, help="probes per axis, 1 to 256")
+    volume.add_argument("--spacing", metavar="M", type=arguments.length, help="or the distance between probes, metres")
 
 
 def add_goal(parser) -> None:
@@ -126,6 +131,13 @@ def add_settings(parser) -> None:
         default=standard.memory_mib,
         help="limit for GPU textures of the capture (default %(default)s)",
     )
+    group.add_argument(
+        "--block",
+        metavar="N",
+        type=int,
+        default=standard.block,
+        help="most probes that share patches of surface; larger grids are baked in blocks (default %(default)s)",
+    )
 
 
 def settings_from(args) -> BakeSettings:
@@ -141,6 +153,7 @@ def settings_from(args) -> BakeSettings:
         seed=args.seed,
         keep_all=args.keep_all,
         memory_mib=args.memory,
+        block=args.block,
         deringing=args.deringing,
     )
 

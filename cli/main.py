@@ -20,6 +20,8 @@ import os
 import signal
 import sys
 import traceback
+from dataclasses import dataclass
+from pathlib import Path
 
 from ..core.errors import Cancelled, GridlightError, InputError
 from ..formats import staging
@@ -27,7 +29,25 @@ from . import worker
 from .arguments import Parser, join_signed_values
 from .progress import Reporter
 
-COMMANDS = ("demo", "bake", "eval", "verify", "bench", "export", "info", "diff")
+
+@dataclass(frozen=True)
+class Family:
+    """A set of commands: modules ``names`` of ``package``. Children run them by ``python -I start``."""
+
+    package: str
+    names: tuple[str, ...]
+    program: str
+    description: str
+    start: Path
+
+
+GRIDLIGHT = Family(
+    package=__package__,
+    names=("demo", "bake", "eval", "verify", "bench", "export", "info", "diff"),
+    program="gridlight",
+    description="Bakes grids of light probes on the GPU.",
+    start=Path(__file__).with_name("__main__.py"),
+)
 
 
 class Stop:
@@ -43,20 +63,20 @@ class Stop:
         self.asked = True
 
 
-def main(argv: list[str], in_blender: bool = False) -> int:
+def main(argv: list[str], in_blender: bool = False, family: Family = GRIDLIGHT) -> int:
     """Runs one command line and returns its exit status. ``in_blender``: called by ``blender --command gridlight``."""
     child = worker.is_child()
     if child:
         worker.prepare_child()
-    status = _guarded(argv, in_blender, child)
+    status = _guarded(argv, in_blender, child, family)
     if child:
         worker.leave(status)
     return status
 
 
-def _guarded(argv: list[str], in_blender: bool, child: bool) -> int:
+def _guarded(argv: list[str], in_blender: bool, child: bool, family: Family) -> int:
     try:
-        return _run(argv, in_blender, child)
+        return _run(argv, in_blender, child, family)
     except Cancelled:
         _say("cancelled")
         return Cancelled.exit_status
@@ -81,18 +101,18 @@ def _guarded(argv: list[str], in_blender: bool, child: bool) -> int:
         return 1
 
 
-def _run(argv: list[str], in_blender: bool, child: bool) -> int:
-    modules = _commands(argv)
-    parser = _parser(modules, in_blender)
+def _run(argv: list[str], in_blender: bool, child: bool, family: Family) -> int:
+    modules = _commands(argv, family)
+    parser = _parser(modules, in_blender, family)
     args = parser.parse_args(join_signed_values(list(argv)))
     if args.command is None:
-        raise InputError(f"name a command: {', '.join(modules)} ('gridlight --help' explains them)")
+        raise InputError(f"name a command: {', '.join(modules)} ('{family.program} --help' explains them)")
     module = modules[args.command]
     if not child and hasattr(module, "check"):
         module.check(args)
     needs_blender = module.NEEDS_BLENDER(args) if callable(module.NEEDS_BLENDER) else module.NEEDS_BLENDER
     if needs_blender and not (in_blender or child):
-        return _run_in_child(argv, args, module)
+        return _run_in_child(argv, args, module, family)
     stop = Stop()
     if child:
         worker.accept_interrupts(stop.ask)
@@ -108,27 +128,27 @@ def _run(argv: list[str], in_blender: bool, child: bool) -> int:
     return status
 
 
-def _run_in_child(argv: list[str], args, module) -> int:
+def _run_in_child(argv: list[str], args, module, family: Family) -> int:
     folder = getattr(args, "output", None)
     try:
         made = staging.missing_folders(folder) if folder else []
     except OSError as error:
         raise InputError(f"cannot write to {folder}: {error.strerror}; name another with -o") from None
-    status, process = worker.run_in_child(argv, _say, module.NEEDS_GPU, args.verbose)
+    status, process = worker.run_in_child(argv, _say, module.NEEDS_GPU, args.verbose, family.start)
     if folder and status in (worker.DIED, Cancelled.exit_status):
         staging.remove_leftovers(folder, process, made)
     return status
 
 
-def _commands(argv: list[str]) -> dict:
+def _commands(argv: list[str], family: Family) -> dict:
     """The command modules that this installation has, by name; only the one that ``argv`` starts with where it does."""
-    available = [name for name in COMMANDS if importlib.util.find_spec(f".{name}", __package__)]
+    available = [name for name in family.names if importlib.util.find_spec(f".{name}", family.package)]
     chosen = [name for name in available if argv[:1] == [name]]
-    return {name: importlib.import_module(f".{name}", __package__) for name in chosen or available}
+    return {name: importlib.import_module(f".{name}", family.package) for name in chosen or available}
 
 
-def _parser(modules: dict, in_blender: bool) -> Parser:
-    parser = Parser(prog="gridlight", description="Bakes grids of light probes on the GPU.")
+def _parser(modules: dict, in_blender: bool, family: Family) -> Parser:
+    parser = Parser(prog=family.program, description=family.description)
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", parser_class=Parser)
     for name, module in modules.items():
         sub = subparsers.add_parser(name, help=module.HELP, description=module.HELP)

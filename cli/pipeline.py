@@ -9,11 +9,11 @@ from contextlib import contextmanager
 import bpy
 import numpy as np
 
+from ..bake.block_session import AnySession, open_session
 from ..bake.error_driven import ErrorDrivenBake
 from ..bake.job import drive
 from ..bake.preview import write_previews
-from ..bake.result import BakeResult
-from ..bake.session import BakeSession
+from ..bake.result import BakeResult, is_unsettled, report_on
 from ..core.conventions import ACTIVE, CULLED, INVALID
 from ..core.error_budget import ErrorGoal
 from ..core.errors import InputError
@@ -81,7 +81,7 @@ def bake_volumes(
     should_stop,
     stopwatch: Stopwatch,
     edits: list[ProbeEdits | None] | None = None,
-    kept: list[BakeSession] | None = None,
+    kept: list[AnySession] | None = None,
     goal: ErrorGoal | None = None,
 ) -> list[BakeResult]:
     """Bakes ``grids`` one after the other, each with its ``edits``, with ``settings`` or as the ``goal`` asks. Appends
@@ -93,7 +93,7 @@ def bake_volumes(
         if len(grids) > 1:
             reporter.note(f"volume '{grid.name}'")
         if goal is None:
-            session = BakeSession(snapshot, grid, settings, reporter, edit)
+            session = open_session(snapshot, grid, settings, reporter, edit)
             drive(session.bake(), should_stop)
         else:
             driven = ErrorDrivenBake(snapshot, grid, settings, goal, reporter, edit)
@@ -106,21 +106,6 @@ def bake_volumes(
         if kept is not None:
             kept.append(session)
     return results
-
-
-def report_on(result: BakeResult, grid: Grid, settings: BakeSettings, reporter) -> bool:
-    """Passes on what a bake or relight had to say; returns whether its light settled where it should have."""
-    for warning in result.warnings:
-        reporter.warn(warning)
-    for note in result.notes:
-        reporter.note(note)
-    if _unsettled(result, settings):
-        reporter.warn(
-            f"{grid.name}: the light has not settled after {result.iterations} iterations; the files are "
-            "written and marked. Raise --tolerance, or darken materials that reflect all light"
-        )
-        return False
-    return True
 
 
 def write_results(
@@ -191,12 +176,7 @@ def write_results(
     )
     summary["files"] = [str(folder.folder / name) for name in [*folder.names, "report.html"]]
     write_report(folder.path("report.html"), report)
-    return summary, NOT_CONVERGED if any(_unsettled(result, settings) for result in results) else 0
-
-
-def _unsettled(result: BakeResult, settings: BakeSettings) -> bool:
-    """Did the light fail to settle where it should have? A number of bounces that was asked for is no failure."""
-    return settings.bounces is None and not result.converged
+    return summary, NOT_CONVERGED if any(is_unsettled(result, settings) for result in results) else 0
 
 
 def _summary(results, device: str, settings: BakeSettings, stopwatch: Stopwatch, reporter) -> dict:

@@ -7,8 +7,9 @@ from dataclasses import asdict
 
 import bpy
 
+from ..bake.block_session import AnySession
 from ..bake.job import drive
-from ..bake.session import BakeSession
+from ..bake.result import report_on
 from ..core.snapshot import SceneSnapshot
 from ..formats import probe_file, probe_metadata
 from ..formats.file_names import volume_endings
@@ -33,7 +34,7 @@ def read_state(state: str, args) -> SceneSnapshot:
 
 def relight_all(
     args,
-    sessions: list[BakeSession],
+    sessions: list[AnySession],
     folder: StagedFolder,
     reporter,
     should_stop,
@@ -54,7 +55,7 @@ def relight_all(
             drive(session.relight(snapshot), should_stop)
             result = session.result
             stopwatch.add(result.seconds)
-            settled &= pipeline.report_on(result, session.grid, session.settings, reporter)
+            settled &= report_on(result, session.grid, session.settings, reporter)
             with stopwatch.measure("write"):
                 result.field.metadata = probe_metadata.provenance(
                     snapshot,

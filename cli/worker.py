@@ -95,8 +95,9 @@ def leave(status: int) -> None:
     os._exit(status)
 
 
-def run_in_child(argv: list[str], say, needs_gpu: bool, verbose: bool) -> tuple[int, int]:
-    """Runs ``argv`` in a child. Returns (exit status, child's process id); ``say`` prints one line for the user."""
+def run_in_child(argv: list[str], say, needs_gpu: bool, verbose: bool, start: Path) -> tuple[int, int]:
+    """Runs ``argv`` in a child that begins with ``start``. Returns (exit status, child's process id); ``say`` prints
+    one line for the user."""
     problem = system_libraries.ensure(say)
     if problem:
         say(problem)
@@ -104,7 +105,6 @@ def run_in_child(argv: list[str], say, needs_gpu: bool, verbose: bool) -> tuple[
     status_read, status_write = os.pipe()
     alive_read, alive_write = os.pipe()
     with tempfile.TemporaryFile() as log:
-        start = Path(__file__).with_name("__main__.py")
         # Held back here and, inherited, in the child until each has its handler: none is lost, none is a traceback.
         signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
         # A process group of its own: Ctrl-C on a terminal reaches only this process, which forwards it exactly once.

@@ -17,24 +17,36 @@ _MOST_PAIRS = 1 << 22  # of probes and objects that are counted without sorting
 _OPEN_SHARE = 0.01  # of a probe's directions that see background: the inside of a solid sees none
 
 
-def inside_solid(shares: np.ndarray) -> np.ndarray:
+def inside_solid(shares: np.ndarray, light_elsewhere: bool = False) -> np.ndarray:
     """(S,) bool of probes that are invalid, from shares (S, 4) of the sphere: back faces of solids, background, lit,
     all back faces.
 
     Most of what such a probe sees are back faces of solids; or back faces of anything, and neither light nor the
-    world, which others do see: where it is dark everywhere that tells nothing.
+    world, which others do see, among these probes or elsewhere: where it is dark everywhere that tells nothing.
     """
     solid, background, lit, behind = shares.T
-    return (solid > _MOST) | ((behind > _MOST) & (background == 0) & (lit == 0) & lit.any())
+    return (solid > _MOST) | ((behind > _MOST) & (background == 0) & (lit == 0) & (lit.any() or light_elsewhere))
 
 
 class ShellVote:
-    """Collects what probes see of objects' back faces, batch by batch."""
+    """Collects what probes see of objects' back faces, batch by batch and block by block.
+
+    ``behind`` and ``lit`` (object_count,) count sightings of back faces, all and lit ones; ``any_light``: something
+    lit, or the world, was seen; ``sees_light``: a probe of a block saw light, set by whoever knows its shares.
+    """
 
     def __init__(self, object_count: int):
-        self._behind = np.zeros(object_count)
-        self._lit = np.zeros(object_count)
-        self._any_light = False
+        self.behind = np.zeros(object_count)
+        self.lit = np.zeros(object_count)
+        self.any_light = False
+        self.sees_light = False
+
+    def merge(self, other: ShellVote) -> None:
+        """Adds the sightings of ``other``. Counts are whole numbers: the order does not matter."""
+        self.behind += other.behind
+        self.lit += other.lit
+        self.any_light |= other.any_light
+        self.sees_light |= other.sees_light
 
     def add(self, sightings: np.ndarray) -> None:
         """``sightings`` (P, S): per probe ±(object + 1) of S directions, negative from behind, half a unit farther
@@ -44,20 +56,20 @@ class ShellVote:
         item = np.floor(size).astype(np.int64) - 1
         open_ = (~seen).mean(axis=1) >= _OPEN_SHARE
         lit = (size > item + 1.25) | open_[:, None]
-        self._any_light |= bool(((size > item + 1.25) | ~seen).any())
+        self.any_light |= bool(((size > item + 1.25) | ~seen).any())
         probe = np.broadcast_to(np.arange(len(sightings))[:, None], sightings.shape)
         # A probe in front of an object may hit the far side of an edge; only those that see mostly back faces count.
-        pair = probe[seen] * len(self._behind) + item[seen]
-        if len(sightings) * len(self._behind) > _MOST_PAIRS:
+        pair = probe[seen] * len(self.behind) + item[seen]
+        if len(sightings) * len(self.behind) > _MOST_PAIRS:
             pair = np.unique(pair, return_inverse=True)[1]
         mostly_behind = np.bincount(pair, np.sign(sightings[seen]))[pair] < 0
         from_behind = mostly_behind & (sightings[seen] < 0)
         item, lit = item[seen][from_behind], lit[seen][from_behind]
-        self._behind += np.bincount(item, minlength=len(self._behind))
-        self._lit += np.bincount(item[lit], minlength=len(self._lit))
+        self.behind += np.bincount(item, minlength=len(self.behind))
+        self.lit += np.bincount(item[lit], minlength=len(self.lit))
 
     def shells(self) -> np.ndarray:
         """(object_count,) bool. In the dark nothing tells a room from a solid: all count as shells."""
-        if not self._any_light:
-            return np.ones(len(self._lit), bool)
-        return (self._lit > 0) & (self._lit >= _LIT_SHARE * self._behind)
+        if not self.any_light:
+            return np.ones(len(self.lit), bool)
+        return (self.lit > 0) & (self.lit >= _LIT_SHARE * self.behind)

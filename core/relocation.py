@@ -20,11 +20,11 @@ _ALIKE = 1e-3  # relative difference of costs that tells nothing
 _OUTWARD_PENALTY = 0.5  # how much farther than inwards the way out of the volume counts
 
 
-def misplaced(shares: np.ndarray) -> np.ndarray:
+def misplaced(shares: np.ndarray, light_elsewhere: bool = False) -> np.ndarray:
     """(S,) bool of probes worth moving, from shares (S, 4) of back faces of solids, background, lit and all back
-    faces."""
+    faces. ``light_elsewhere``: probes that are not among these see light."""
     dark = shares[:, 2] == 0
-    return inside_solid(shares) | (dark & (np.maximum(shares[:, 1], shares[:, 3]) > _LEAST_BEHIND))
+    return inside_solid(shares, light_elsewhere) | (dark & (np.maximum(shares[:, 1], shares[:, 3]) > _LEAST_BEHIND))
 
 
 def moves(grid: Grid, positions: np.ndarray, exits: np.ndarray) -> np.ndarray:

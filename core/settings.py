@@ -30,6 +30,7 @@ class BakeSettings:
     seed: int = 0
     keep_all: bool = False
     memory_mib: int = 512
+    block: int = 4096  # most probes of a block, see core/blocks.py
     deringing: bool = False  # window the probes whose irradiance falls below zero (core/ringing.py)
 
     def __post_init__(self):
@@ -42,6 +43,7 @@ class BakeSettings:
         _check("--samples", self.samples, 1, 4096)
         _check("--seed", self.seed, 0, 2**31 - 1)
         _check("--memory", self.memory_mib, 16, 1 << 20)
+        _check("--block", self.block, 1, MAX_RESOLUTION**3)
         if self.capture not in CAPTURES:
             raise InputError(f"--capture is '{self.capture}'; choose one of {', '.join(CAPTURES)}")
 

@@ -53,10 +53,26 @@ def provenance(
     snapshot: SceneSnapshot, settings: BakeSettings, device: str, iterations: int, converged: bool, warnings: list[str]
 ) -> dict:
     """The metadata of a baked field. Holds no times, so that equal bakes give equal bytes."""
+    return stated(
+        snapshot.name, snapshot.frame, scene_hash(snapshot), settings, device, iterations, converged, warnings
+    )
+
+
+def stated(
+    scene_name: str,
+    frame: int,
+    scene_digest: str,
+    settings: BakeSettings,
+    device: str,
+    iterations: int,
+    converged: bool,
+    warnings: list[str],
+) -> dict:
+    """The same where the scene itself is elsewhere."""
     return {
         "generator": f"Gridlight {program_version()}",
-        "scene": {"name": snapshot.name, "frame": snapshot.frame},
-        "scene_hash": scene_hash(snapshot),
+        "scene": {"name": scene_name, "frame": frame},
+        "scene_hash": scene_digest,
         "settings": settings.as_dict(),
         "device": device,
         "iterations": iterations,

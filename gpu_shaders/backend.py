@@ -7,12 +7,14 @@ GPU while the memory budget allows; the field never leaves it between iterations
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import gpu
 import numpy as np
 
 from ..core import lookup
+from ..core.blocks import Block
 from ..core.conventions import DEPTH_EDGE
 from ..core.cubemap import texel_solid_angles
 from ..core.emitters import PROBE_POINTS, PROBE_RAYS, sampling_density
@@ -20,7 +22,7 @@ from ..core.grid import Grid
 from ..core.patches import gather_rays
 from ..core.scene_changes import SceneChanges
 from ..core.settings import BakeSettings
-from ..core.snapshot import SceneSnapshot, World
+from ..core.snapshot import Light, SceneSnapshot, World
 from ..core.steps import Pace, Steps
 from ..core.world_map import world_texels
 from ..core.world_suns import extract_suns
@@ -45,12 +47,21 @@ _TEXELS_AT_ONCE = 1 << 19  # that are bound to patches; their surfaces take 24 M
 _HIT_BYTES = 20  # hit record and depth, which exist during capture only
 
 
+# World, face size, and its texels whole and without suns, by scene: blocks of a bake share both.
+_worlds: WeakKeyDictionary[SceneTextures, tuple] = WeakKeyDictionary()
+
+
 @dataclass
 class _Hits:
     """Layered image of hits, layer = probe·6 + face of the capture in hand."""
 
     texture: gpu.types.GPUTexture
     layers: int
+
+
+def probes_in_budget(settings: BakeSettings) -> int:
+    """Probes whose texel surfaces fit the memory budget together."""
+    return max(1, (settings.memory_mib << 20) // (6 * settings.face**2 * BYTES_PER_TEXEL))
 
 
 @dataclass
@@ -72,9 +83,12 @@ class GpuBackend:
         settings: BakeSettings,
         scene: SceneTextures | None = None,
         pace: Pace | None = None,
+        block: Block | None = None,
     ):
         """``scene``: ``snapshot`` with the grid's centre as origin, made here where it is not given. ``pace``: of what
-        is done in steps."""
+        is done in steps. ``block``: the part of ``grid`` that the probes are of; patches and random numbers are its
+        own."""
+        self._block = block
         self._pace = pace or Pace(None)
         self.grid = grid
         self.settings = settings
@@ -97,7 +111,7 @@ class GpuBackend:
         self._portion = min(layer_limit, max(1, _TEXELS_AT_ONCE // texels))
         fitting = max(1, min(layer_limit, budget // (texels * BYTES_PER_TEXEL)))
         self.probes_per_batch = max(fitting // self._portion, 1) * self._portion
-        self.probes_in_budget = max(1, budget // (texels * BYTES_PER_TEXEL))
+        self.probes_in_budget = probes_in_budget(settings)
         self._hits: _Hits | None = None
         self._raster: RasterCapture | None = None
 
@@ -109,20 +123,24 @@ class GpuBackend:
         settings: BakeSettings,
         pace: Pace,
         scene: SceneTextures | None = None,
+        block: Block | None = None,
     ) -> Steps[GpuBackend]:
         """The same in steps."""
         if scene is not None:
-            return cls(snapshot, grid, settings, scene, pace)
+            return cls(snapshot, grid, settings, scene, pace, block)
         density = yield from pace.in_background(sampling_density, snapshot, grid)
         scene = yield from SceneTextures.make(snapshot, grid.center, density, pace)
-        return cls(snapshot, grid, settings, scene, pace)
+        return cls(snapshot, grid, settings, scene, pace, block)
 
     def _send_world(self, snapshot: SceneSnapshot) -> None:
         """Probes see the world whole; to patches its suns are lamps and rays see the rest."""
-        rest, suns = extract_suns(snapshot.world)
-        self.scene.set_suns(suns)
-        self.world_texels = self._background(snapshot.world)
-        self.world_rest = self._background(rest) if suns else self.world_texels
+        known = _worlds.get(self.scene)
+        if known is None or known[0] is not snapshot.world or known[1] != self.face:
+            rest, suns = extract_suns(snapshot.world)
+            self.scene.set_suns(suns)
+            whole = self._background(snapshot.world)
+            known = _worlds[self.scene] = snapshot.world, self.face, whole, self._background(rest) if suns else whole
+        self.world_texels, self.world_rest = known[2:]
 
     def _background(self, world: World) -> gpu.types.GPUTexture:
         background = np.zeros((6 * self.face**2, 4), np.float32)
@@ -254,7 +272,18 @@ class GpuBackend:
 
     def forget_patches(self) -> None:
         """Begins with no patch: all texels must be bound again."""
-        self.light = PatchLight(self.scene, self.grid, self.settings, self.world_rest, self._pace)
+        grid, settings = self.grid, self.settings
+        if self._block is not None:
+            grid, settings = self._block.grid(grid), replace(settings, seed=self._block.seed(settings.seed))
+        self.light = PatchLight(self.scene, grid, settings, self.world_rest, self._pace)
+
+    def follow_lamps(self, lights: list[Light]) -> None:
+        """Other lamps for the same scene; texel surfaces stay what they are."""
+        self.scene.set_lights(lights, self.grid.center)
+
+    def release_scratch(self) -> None:
+        """Lets go of what only a capture needs."""
+        self._hits = self._raster = None
 
     def bind(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> Steps[None]:
         """Finds the patches on which the texels of all or of ``count`` probes from ``start`` lie, in steps."""

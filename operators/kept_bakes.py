@@ -10,9 +10,9 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
+from ..bake.block_session import open_session
 from ..bake.error_driven import ErrorDrivenBake
 from ..bake.result import Reporter
-from ..bake.session import BakeSession
 from ..core.error_budget import ErrorGoal
 from ..core.grid import Grid
 from ..core.probe_edits import ProbeEdits
@@ -55,7 +55,7 @@ class KeptBake:
     ):
         self.relay = Relay(reporter)
         pace = Pace(STEP_SECONDS, wait_for_gpu)
-        self.session = BakeSession(snapshot, grid, settings, self.relay, edits, pace=pace)
+        self.session = open_session(snapshot, grid, settings, self.relay, edits, pace=pace)
         self._driven = ErrorDrivenBake(snapshot, grid, settings, goal, self.relay, edits, pace=pace) if goal else None
         self._grid, self._settings, self._edits = grid, settings, edits or ProbeEdits.none(grid)
 

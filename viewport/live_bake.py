@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..bake.block_session import AnySession, open_session
 from ..bake.result import Silent
-from ..bake.session import BakeSession
 from ..core.errors import GridlightError
 from ..core.field import Field
 from ..core.grid import Grid
@@ -73,7 +73,7 @@ class _Kept:
     """A bake that lives on the GPU, for ``target``."""
 
     target: Target
-    session: BakeSession
+    session: AnySession
     moments: np.ndarray  # (S,) when the state of the scene was seen that each probe shows
     rounds: int = 0
     is_unseen: bool = False  # what is shown is not of this bake
@@ -112,7 +112,7 @@ class LiveBake:
         return self._is_rough
 
     def backend_of(self, name: str):
-        """The GPU's side of a volume's bake; None where there is none."""
+        """The GPU's side of a volume's bake; None where there is none, or one for each of several blocks."""
         return self._kept[name].session.backend if name in self._kept else None
 
     def show_whole(self) -> None:
@@ -164,7 +164,7 @@ class LiveBake:
             kept = before.pop(target.grid.name, None)
             if kept is None or kept.session.settings != wanted.settings or not kept.target.equals(target):
                 del kept
-                session = BakeSession(
+                session = open_session(
                     wanted.snapshot, target.grid, wanted.settings, Silent(), target.edits, pace=self._pace
                 )
                 for _ in session.bake():

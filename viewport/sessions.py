@@ -128,7 +128,10 @@ class SceneSession:
             self._live_fields |= progress.fields
             self.gpu.show_fields(progress.fields, with_old_light=not progress.is_settled)
             for name in progress.fields:
-                self._leads[name] = LiveField(self._live.backend_of(name), self.gpu.fields[name])
+                backend = self._live.backend_of(name)
+                self._leads.pop(name, None)
+                if backend is not None:
+                    self._leads[name] = LiveField(backend, self.gpu.fields[name])
             self.version += 1
         self.readout.shows(self._live.shown_moment)
 

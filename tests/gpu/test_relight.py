@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gridlight.bake.block_session import open_session
 from gridlight.bake.job import drive
 from gridlight.bake.session import BakeSession
 from gridlight.core.grid import Grid
@@ -258,6 +259,21 @@ def test_suns_of_the_world_come_move_and_go():
         followed(session.relight(new))
         assert session.result.relit.probes_captured == 0
         assert_same_bake(session.result, bake(new, where, session.settings))
+
+
+@pytest.mark.parametrize("memory_mib", [512, pytest.param(16, marks=pytest.mark.nightly)], ids=["kept", "given up"])
+def test_relighting_several_blocks(memory_mib):
+    """Blocks keep their texel surfaces while only lamps differ, if the memory budget lets them; else all is anew."""
+    where, face = (grid(), 8) if memory_mib == 512 else (grid((6, 6, 3)), 32)
+    settings = BakeSettings(**{**SETTINGS, "block": where.count // 2, "memory_mib": memory_mib, "face": face})
+    session = open_session(rooms(), where, settings, Silent())
+    followed(session.bake())
+    assert (len(session.open_blocks) == 1) == (memory_mib == 16)
+    for new in (with_light(rooms(), 0, color=(1.0, 3.0, 3.0)), with_moved(rooms(), 2, (0.1, 0.4, 0.0))):
+        captures_few = new.lights[0].color != rooms().lights[0].color and memory_mib == 512
+        followed(session.relight(new))
+        assert_same_bake(session.result, bake(new, where, settings))
+        assert (session.result.relit.probes_captured < where.count // 2) == captures_few
 
 
 @pytest.mark.nightly

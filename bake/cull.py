@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which probes capture at all."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..core import culling
+from ..core.conventions import ACTIVE, CULLED
+from ..core.errors import InputError
+from ..core.grid import Grid
+from ..core.probe_edits import ProbeEdits
+from ..core.settings import BakeSettings
+from ..core.snapshot import SceneSnapshot
+
+
+def cull(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, edits: ProbeEdits) -> np.ndarray:
+    """(P,) uint8 states before capture: ACTIVE or CULLED.
+
+    Raises:
+        InputError: the user switched off every probe.
+    """
+    state = np.full(grid.count, ACTIVE, np.uint8)
+    if not settings.keep_all:
+        state[~culling.needed_nodes(grid, snapshot.triangle_positions)] = CULLED
+    state[edits.disabled] = CULLED
+    if edits.disabled.any() and not (state == ACTIVE).any():
+        raise InputError(f"{grid.name}: every probe is switched off; bring some back with Reset in the Volume panel")
+    return state

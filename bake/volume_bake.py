@@ -1,0 +1,310 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One volume's bake on the GPU, from its scene to its field, in steps: generators that yield between pieces of work.
+
+``bake`` is the whole. A grid that is baked in blocks (core/blocks.py) has one session a block, whose steps
+block_session.py takes apart: ``open``, ``see`` up to the votes on shells, ``settle`` by the votes of all blocks and
+``show``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core import clearance
+from ..core.blocks import Block
+from ..core.conventions import ACTIVE
+from ..core.grid import Grid
+from ..core.orientation import ShellVote
+from ..core.probe_edits import ProbeEdits
+from ..core.settings import BakeSettings
+from ..core.snapshot import SceneSnapshot
+from ..core.steps import Pace, Steps
+from ..gpu_shaders.backend import GpuBackend
+from ..gpu_shaders.scene_textures import SceneTextures
+from .batches import Batches
+from .capture_choice import choose_capture
+from .convergence import MANY_MODES, Convergence
+from .cull import cull
+from .finish import complete
+from .outcome import BlockOutcome
+from .placement import Placement, place, vote
+from .result import BakeResult, Reporter, check_scene
+from .stopwatch import Stopwatch
+
+
+@dataclass(frozen=True)
+class Part:
+    """A block that is baked by a session of its own."""
+
+    block: Block
+    state: np.ndarray  # (P,) before capture: no node outside the block is active
+    capture: str  # "raster" or "trace"
+    obstacles: np.ndarray  # (T, 3, 3) what its probes keep clear of
+
+
+class VolumeBake:
+    """``result`` is filled by ``bake``; it may be given.
+
+    ``edits``: probes that the user switched off or moved. Moved ones capture where they were put and are not relocated.
+    ``stopwatch``: one that measures more than seconds by phase.
+    """
+
+    def __init__(
+        self,
+        snapshot: SceneSnapshot,
+        grid: Grid,
+        settings: BakeSettings,
+        reporter: Reporter,
+        edits: ProbeEdits | None = None,
+        result: BakeResult | None = None,
+        stopwatch: Stopwatch | None = None,
+        pace: Pace | None = None,
+        scene: SceneTextures | None = None,
+        part: Part | None = None,
+    ):
+        """``pace``: how much is done in a step; without one steps are as large as they come. ``scene``: ``snapshot`` on
+        the GPU, from another session of the same grid. ``part``: bake this part of the grid, for block_session.py."""
+        self.snapshot = snapshot
+        self.grid = grid
+        self.settings = settings
+        self.result = result or BakeResult()
+        self._reporter = reporter
+        self._edits = edits or ProbeEdits.none(grid)
+        self._stopwatch = stopwatch or Stopwatch({})
+        self._stopwatch.seconds = self.result.seconds
+        self._pace = pace or Pace(None)
+        self._obstacles_of: tuple[SceneSnapshot | None, np.ndarray] = (None, np.zeros((0, 3, 3)))
+        self.unshown = np.zeros(0, bool)  # (S,): probes whose light has changed since ``show`` was there
+        self._scene = scene
+        self._part = part
+
+    # The bake
+    # ------------------------------------------------------------------------------------------------------------------
+
+    def bake(self) -> Steps[None]:
+        """The whole bake in steps; fills ``result`` as it goes and completes it with the last step.
+
+        Raises:
+            InputError: the scene has no surface, or the grid does not fit the GPU.
+        """
+        check_scene(self.snapshot, self.result)
+        yield from self.open()
+        verdict = yield from self.see()
+        yield from self.settle(verdict)
+        yield from self.show()
+        yield from self.finish()
+
+    def open(self) -> Steps[None]:
+        """What a bake begins with: the scene on the GPU, and which probes capture, at home."""
+        result = self.result
+        self._reporter.phase("cull")
+        self._state = yield from self._stopwatch.steps("cull", self._pace.in_background(self._cull))
+        yield
+        self._reporter.phase("upload")
+        block = None if self._part is None else self._part.block
+        making = GpuBackend.make(self.snapshot, self.grid, self.settings, self._pace, self._scene, block)
+        self.backend = yield from self._stopwatch.steps("setup", making)
+        yield
+        result.scene = self.backend.scene
+        if self._part is None:
+            triangles, probes = self.backend.scene.triangle_count, int((self._state == ACTIVE).sum())
+            result.capture, reason = choose_capture(self.settings, triangles, probes)
+        else:
+            result.capture, reason = self._part.capture, f"capture by {self._part.capture}, as for all blocks"
+        result.notes.append(reason)
+        nodes = np.flatnonzero(self._state == ACTIVE)
+        self._batches = Batches(self.backend, nodes, result.capture, self._stopwatch, self._pace)
+        if not self._batches.resident:
+            result.notes.append(
+                f"texel surfaces of {len(self._batches.nodes)} probes exceed the memory budget of "
+                f"{self.settings.memory_mib} MiB: they are captured again whenever they are needed"
+            )
+        yield from self._stand_at_home()
+
+    def _cull(self) -> np.ndarray:
+        """(P,) uint8 states before capture: ACTIVE or CULLED."""
+        if self._part is not None:
+            return self._part.state
+        return cull(self.snapshot, self.grid, self.settings, self._edits)
+
+    def _obstacles(self) -> np.ndarray:
+        """What probes keep clear of; found once per state of the scene."""
+        if self._part is not None:
+            return self._part.obstacles
+        if self._obstacles_of[0] is not self.snapshot:
+            self._obstacles_of = (self.snapshot, clearance.obstacles(self.grid, self.snapshot))
+        return self._obstacles_of[1]
+
+    def _stand_at_home(self) -> Steps[None]:
+        """Puts the probes of all slots where they belong, with no light yet."""
+        nodes = self._batches.nodes
+
+        def at_home() -> Placement:
+            return Placement.at_home(self.grid, nodes, self._edits.offset, self._obstacles())
+
+        self._placement = yield from self._stopwatch.steps("cull", self._pace.in_background(at_home))
+        self.backend.set_probes(self._batches.nodes, self._placement.home)
+        self.backend.allocate_field()
+
+    def see(self) -> Steps[ShellVote]:
+        """Captures, finds patches, lights them directly; returns what the probes say about objects' back faces."""
+        batches = self._batches
+        self._reporter.phase("capture", len(batches.nodes))
+        for index in range(batches.count):
+            surfaces = yield from batches.bound(index)
+            self._reporter.advance(surfaces.count)
+            yield
+        yield from self._stopwatch.steps("light", self.backend.light.light_new_patches())
+        return (yield from vote(batches, self.backend, for_others=self._part is not None))
+
+    def settle(self, verdict: ShellVote) -> Steps[None]:
+        """Everything after ``see`` but ``show``, by what all probes said: placement and bounces."""
+        result = self.result
+        yield from place(self._placement, self._batches, self.backend, self.grid, self._obstacles, verdict)
+        moved = int(self._placement.moved.sum())
+        if moved:
+            result.notes.append(f"{moved} probes in or behind walls were moved out, at most half a cell")
+        self._reporter.phase("light")
+        yield from self._stopwatch.steps("light", self.backend.light.connect())
+        result.notes.append(f"light bounces between {self.backend.light.count} patches of surface")
+        yield
+        yield from self._bounce(warm=False)
+        self._mark_unshown(emission=self.backend.scene.emitter_count > 0)
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """(S,) grid indices of the probes that capture."""
+        return self._batches.nodes
+
+    def start_over(self) -> Steps[None]:
+        """Back to where ``see`` begins, with the texel surfaces that are there."""
+        self.result = BakeResult(scene=self.backend.scene, capture=self.result.capture)
+        self._stopwatch.seconds = self.result.seconds
+        yield from self._go_home()
+
+    def _go_home(self) -> Steps[None]:
+        """Forgets patches; probes that had been moved capture at home, where placement begins."""
+        moved = np.flatnonzero(self._placement.moved)
+        yield from self._stand_at_home()
+        self._batches.unbind()
+        yield from self._batches.capture_again(moved)
+        self.backend.forget_patches()
+        yield
+
+    def light_with(self, settings: BakeSettings) -> Steps[None]:
+        """Lights what was baked once more with other ``settings`` of light, its seed among them, in steps: probes stay
+        where they are and see what they saw. ``result`` is a new one."""
+        self.settings = self.backend.settings = settings
+        self.result = BakeResult(scene=self.backend.scene, capture=self.result.capture)
+        self._stopwatch.seconds = self.result.seconds
+        self._batches.unbind()
+        self.backend.forget_patches()
+        self.backend.forget_emission()
+        for index in range(self._batches.count):
+            yield from self._batches.bound(index)
+        yield from self._stopwatch.steps("light", self.backend.light.light_new_patches())
+        yield from self._stopwatch.steps("light", self.backend.light.connect())
+        yield from self._bounce(warm=False)
+        self._mark_unshown(emission=self.backend.scene.emitter_count > 0)
+        yield from self.show()
+        yield from self.finish()
+
+    def _bounce(self, warm: bool) -> Steps[None]:
+        """Iterates until the light has settled, from the dark or from the light before."""
+        convergence = Convergence(self.settings.bounces, self.settings.tolerance)
+        while not convergence.done:
+            with self._stopwatch("light"):
+                energy, change, overlap, luminance = self.backend.light.iterate(
+                    bounce=warm or convergence.iterations > 0
+                )
+                self.result.energy.append(luminance)
+                factor = convergence.add(energy, change, overlap)
+                self._reporter.advance(1)
+                if factor == MANY_MODES:
+                    self.backend.light.extrapolate_modes()
+                elif factor:
+                    self.backend.light.extrapolate(factor)
+            yield
+        self.result.iterations = convergence.iterations
+        self.result.converged = convergence.converged
+        self.result.missing = convergence.missing
+        self.result.change = convergence.changes
+        self.result.notes.append(convergence.reason)
+        self._reason = convergence.reason
+
+    def _mark_unshown(self, emission: bool) -> None:
+        """The light of all probes has changed; with ``emission``, also what they see of sampled emitters."""
+        self.unshown = np.ones(len(self._batches.nodes), bool)
+        self._emission_unknown = np.full(len(self._batches.nodes), emission)
+
+    @property
+    def positions(self) -> np.ndarray:
+        """(S, 3) world metres: where probes capture."""
+        return self._placement.home + self._placement.step
+
+    def show(self, slots: np.ndarray | None = None) -> Steps[None]:
+        """The field of the probes in ``slots`` (L,), or of all, by the light of patches, or by a gather."""
+        batches, backend, kind = self._batches, self.backend, "gather" if self.settings.gather else "project"
+        slots = np.arange(len(batches.nodes)) if slots is None else slots
+        self._reporter.phase(kind, len(slots))
+        for index in range(batches.count):
+            mine = batches.slots_of(index, slots)
+            if not len(mine):
+                continue
+            surfaces = yield from batches.bound(index)
+
+            def project(start: int, number: int, mine=mine, surfaces=surfaces) -> None:
+                some = mine[start : start + number]
+                blind = some[self._emission_unknown[some]]
+                if len(blind):
+                    backend.find_emission(surfaces, blind - surfaces.first)
+                    self._emission_unknown[blind] = False
+                (backend.gather if self.settings.gather else backend.project)(surfaces, some - surfaces.first)
+                self.unshown[some] = False
+                self._reporter.advance(number)
+
+            yield from self._stopwatch.steps("light", self._pace.portions(kind, len(mine), project))
+
+    def finish(self) -> Steps[None]:
+        """Reads the field back and completes it for probes without light of their own."""
+        with self._stopwatch("light"):
+            outcome = self.outcome()
+        yield
+        work = self._pace.in_background(
+            complete,
+            self.result,
+            self.grid,
+            self.settings,
+            self._state,
+            self._edits.offset,
+            [outcome],
+            self.snapshot.name,
+        )
+        yield from self._stopwatch.steps("light", work)
+
+    def outcome(self) -> BlockOutcome:
+        """What the probes hold, read back. Waits for the GPU."""
+        placement, result = self._placement, self.result
+        return BlockOutcome(
+            placement.nodes,
+            (self.positions - self.grid.positions()[placement.nodes]).astype(np.float32),
+            placement.shares.astype(np.float32),
+            self.backend.read_field(),
+            self.backend.read_depth(),
+            self.backend.read_gradient(),
+            int(placement.moved.sum()),
+            self.backend.light.count,
+            result.iterations,
+            result.converged,
+            result.missing,
+            self._reason,
+            tuple(result.energy),
+            tuple(result.change),
+        )
+
+    @property
+    def captures(self) -> int:
+        """Probes captured so far."""
+        return self._batches.captures
