@@ -138,9 +138,7 @@ class BakeSession(VolumeBake):
     def _reshape(self, shape: ShapeChange, hierarchy: str, old_order: np.ndarray, had_emitters: bool) -> Steps[None]:
         """Texel surfaces for triangles that changed: captured where the change can be seen, kept elsewhere."""
         backend, batches, placement = self.backend, self._batches, self._placement
-        self._state = yield from self._stopwatch.steps(
-            "cull", self._pace.in_background(self._cull)
-        )
+        self._state = yield from self._stopwatch.steps("cull", self._pace.in_background(self._cull))
         again = placement.moved
         for index in range(batches.count) if batches.resident else ():
             surfaces = yield from batches.captured(index)

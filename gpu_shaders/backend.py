@@ -8,7 +8,6 @@ GPU while the memory budget allows; the field never leaves it between iterations
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from weakref import WeakKeyDictionary
 
 import gpu
 import numpy as np
@@ -22,16 +21,15 @@ from ..core.grid import Grid
 from ..core.patches import gather_rays
 from ..core.scene_changes import SceneChanges
 from ..core.settings import BakeSettings
-from ..core.snapshot import Light, SceneSnapshot, World
+from ..core.snapshot import SceneSnapshot
 from ..core.steps import Pace, Steps
-from ..core.world_map import world_texels
-from ..core.world_suns import extract_suns
 from .gradient_pass import GradientPass
 from .patch_light import PatchLight
 from .programs import program
 from .raster_capture import RasterCapture
 from .scene_textures import SceneTextures
 from .textures import allocate, layers, numbers, read, scratch, upload
+from .world_light import send_world
 
 _GROUP = 64  # threads that share a probe where its texels are summed
 # Kept images of texel surfaces. Albedo is 32 bit: in a bright room an error of 1e-4 in 0.99 is one of 1e-2 in the
@@ -45,10 +43,6 @@ BYTES_PER_TEXEL = 16 * len(_SURFACE_FORMATS)
 _GATHER_RAYS = 1 << 20  # at once
 _TEXELS_AT_ONCE = 1 << 19  # that are bound to patches; their surfaces take 24 MiB
 _HIT_BYTES = 20  # hit record and depth, which exist during capture only
-
-
-# World, face size, and its texels whole and without suns, by scene: blocks of a bake share both.
-_worlds: WeakKeyDictionary[SceneTextures, tuple] = WeakKeyDictionary()
 
 
 @dataclass
@@ -101,7 +95,7 @@ class GpuBackend:
         weights[:, 0] = texel_solid_angles(self.face).ravel()
         self._texel_weights = upload(weights, "texels")
         self._gradient = GradientPass(settings.face, settings.bands, grid)
-        self._send_world(snapshot)
+        self.world_texels, self.world_rest = send_world(self.scene, snapshot.world, self.face)
         self.forget_patches()
         layer_limit = gpu.capabilities.max_texture_layers_get()
         texels = 6 * self.face**2
@@ -132,21 +126,6 @@ class GpuBackend:
         scene = yield from SceneTextures.make(snapshot, grid.center, density, pace)
         return cls(snapshot, grid, settings, scene, pace, block)
 
-    def _send_world(self, snapshot: SceneSnapshot) -> None:
-        """Probes see the world whole; to patches its suns are lamps and rays see the rest."""
-        known = _worlds.get(self.scene)
-        if known is None or known[0] is not snapshot.world or known[1] != self.face:
-            rest, suns = extract_suns(snapshot.world)
-            self.scene.set_suns(suns)
-            whole = self._background(snapshot.world)
-            known = _worlds[self.scene] = snapshot.world, self.face, whole, self._background(rest) if suns else whole
-        self.world_texels, self.world_rest = known[2:]
-
-    def _background(self, world: World) -> gpu.types.GPUTexture:
-        background = np.zeros((6 * self.face**2, 4), np.float32)
-        background[:, :3] = world_texels(world, self.face).reshape(-1, 3)
-        return upload(background, "texels")
-
     def update(self, snapshot: SceneSnapshot, changes: SceneChanges) -> str:
         """Brings the scene to ``snapshot``; texel surfaces and patches stay what they are. Returns what became of the
         hierarchy, see SceneTextures.update."""
@@ -157,7 +136,7 @@ class GpuBackend:
             self._raster = None  # it knows where triangles lie
             self.object_count = max(len(snapshot.object_names), 1)
         if changes.world:
-            self._send_world(snapshot)
+            self.world_texels, self.world_rest = send_world(self.scene, snapshot.world, self.face)
             self.light.world_texels = self.world_rest
         return hierarchy
 
@@ -276,10 +255,6 @@ class GpuBackend:
         if self._block is not None:
             grid, settings = self._block.grid(grid), replace(settings, seed=self._block.seed(settings.seed))
         self.light = PatchLight(self.scene, grid, settings, self.world_rest, self._pace)
-
-    def follow_lamps(self, lights: list[Light]) -> None:
-        """Other lamps for the same scene; texel surfaces stay what they are."""
-        self.scene.set_lights(lights, self.grid.center)
 
     def release_scratch(self) -> None:
         """Lets go of what only a capture needs."""

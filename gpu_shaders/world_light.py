@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The world as a bake reads it: texels of a cube's faces, whole for probes, without its suns for patches."""
+
+from __future__ import annotations
+
+from weakref import WeakKeyDictionary
+
+import gpu
+import numpy as np
+
+from ..core.snapshot import World
+from ..core.world_map import world_texels
+from ..core.world_suns import extract_suns
+from .scene_textures import SceneTextures
+from .textures import upload
+
+# World, face size and texels, by scene: blocks of a bake share both.
+_known: WeakKeyDictionary[SceneTextures, tuple] = WeakKeyDictionary()
+
+
+def send_world(scene: SceneTextures, world: World, face: int) -> tuple[gpu.types.GPUTexture, gpu.types.GPUTexture]:
+    """(whole, rest), faces of ``face``² texels one after the other. Probes see the world whole; to patches its suns are
+    lamps, which ``scene`` gets, and rays see the rest."""
+    known = _known.get(scene)
+    if known is None or known[0] is not world or known[1] != face:
+        rest, suns = extract_suns(world)
+        scene.set_suns(suns)
+        whole = _background(world, face)
+        known = _known[scene] = world, face, whole, _background(rest, face) if suns else whole
+    return known[2], known[3]
+
+
+def _background(world: World, face: int) -> gpu.types.GPUTexture:
+    background = np.zeros((6 * face**2, 4), np.float32)
+    background[:, :3] = world_texels(world, face).reshape(-1, 3)
+    return upload(background, "texels")
