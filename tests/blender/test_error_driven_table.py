@@ -27,8 +27,8 @@ from gridlight.scene.gallery import build_gallery
 from gridlight.scene.read import read_scene
 
 TARGETS = (0.10, 0.05, 0.03, 0.02)
-BY_HAND = ((6, 1), (8, 1), (12, 1), (16, 1), (16, 2), (16, 4), (24, 2), (32, 4), (32, 12))  # face, samples
-POINTS, HEIGHT, SAMPLES, SEEDS = 28, 64, 24, (1, 1_000_003)
+BY_HAND = ((6, 1), (8, 1), (12, 1), (16, 2), (24, 2), (32, 4))  # face, samples
+POINTS, HEIGHT, SAMPLES, SEEDS = 20, 64, 12, (1, 1_000_003)
 LEAST_MET, MOST_COST = 0.9, 3.0
 
 
@@ -106,7 +106,7 @@ class Judge:
     def __init__(self, scene, snapshot, grid, field):
         space = verify_points.FreeSpace(snapshot, verify_points.cycles_light(scene))
         nodes = np.flatnonzero(field.state == 1)
-        nodes = nodes[np.random.default_rng(0).permutation(len(nodes))[: 3 * POINTS]]
+        nodes = nodes[np.random.default_rng(0).permutation(len(nodes))[: 2 * POINTS]]
         positions = (grid.positions() + field.offset)[nodes]
         free = space.is_free(positions)
         self._nodes, positions = nodes[free][:POINTS], positions[free][:POINTS]
