@@ -148,12 +148,13 @@ def check_bound(spec):
 
 
 def check_place_and_size(spec):
-    """A hundred kilometres away and a hundredth the size: the same light, to half a percent."""
+    """A hundred kilometres away and about a hundredth the size: the same light, to half a percent. The scale is a power
+    of two, so that rounding leaves every choice of patches and with it their noise as it is."""
     snapshot, grid, base = as_it_is(spec)
     here = base.field
     # A probe in the very plane of a wall that nothing moved away looks past it to either side, by rounding.
     clear = here.offset.any(axis=1) if spec.volume == "on the walls" else np.ones(grid.count, bool)
-    far, small = np.eye(4), np.diag([0.01, 0.01, 0.01, 1.0])
+    far, small = np.eye(4), np.diag([2.0**-7, 2.0**-7, 2.0**-7, 1.0])
     far[:3, 3] = 1e5, -7e4, 3e4
     for matrix in (far, small):
         there = moved(snapshot, matrix)
