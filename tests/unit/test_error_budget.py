@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from gridlight.cli import arguments, bake
 from gridlight.core.error_budget import ErrorGoal, ErrorModel, Level, first_level, next_level, worst_probes
 from gridlight.core.errors import InputError
 
@@ -69,3 +70,18 @@ def test_the_worst_probes_are_the_fewest_that_do():
     chosen = worst_probes(squared, 0.0, 2.0)
     assert chosen.tolist() == [False, True, False, True, False, False, False, False]
     assert worst_probes(squared, 0.5, 1.0).all()
+
+
+def test_options_that_are_given_are_kept():
+    parser = arguments.Parser()
+    bake.add_arguments(parser, in_blender=False)
+
+    def read(*options):
+        return parser.parse_args(arguments.join_signed_values(["room.blend", "-o", "out", *options]))
+
+    args = read("--face", "8", "--error", "0.02", "--bounces", "3")
+    assert bake.goal_from(args) == ErrorGoal(0.02, frozenset({"face", "bounces"}))
+    assert bake.settings_from(args).face == 8
+    assert bake.goal_from(read("--face", "8")) is None and bake.goal_from(read("--error", "0.1")).kept == frozenset()
+    with pytest.raises(InputError, match="--error is -0.02"):
+        bake.goal_from(read("--error", "-0.02"))
