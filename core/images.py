@@ -18,7 +18,7 @@ def mip_level(image: Image, footprint: np.ndarray) -> np.ndarray:
     """(N,) level for sampled areas ``footprint`` (N,) uv units wide: texels per footprint, log2, rounded."""
     longest = max(image.pixels.shape[:2])
     level = np.floor(np.log2(np.maximum(footprint * longest, 1.0)) + 0.5).astype(int)
-    return np.minimum(level, int(np.log2(longest)))
+    return np.minimum(level, 0 if image.extension == "ATLAS" else int(np.log2(longest)))
 
 
 def smaller(pixels: np.ndarray) -> np.ndarray:

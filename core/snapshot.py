@@ -27,7 +27,7 @@ class Image:
 
     name: str
     pixels: np.ndarray
-    extension: str = "REPEAT"  # REPEAT | EXTEND | CLIP | MIRROR, as in Blender's image texture node
+    extension: str = "REPEAT"  # REPEAT | EXTEND | CLIP | MIRROR, as in Blender's image texture node; ATLAS: never mipped
 
 
 @dataclass(frozen=True)

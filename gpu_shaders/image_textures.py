@@ -11,7 +11,7 @@ from .dispatch import dispatch_linear
 from .programs import program
 from .textures import ROW, allocate, upload
 
-_EXTENSIONS = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2, "MIRROR": 3}
+_EXTENSIONS = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2, "MIRROR": 3, "ATLAS": 4}
 
 
 def send_images(images: list[Image]) -> tuple[gpu.types.GPUTexture, gpu.types.GPUTexture]:

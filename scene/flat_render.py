@@ -24,7 +24,7 @@ def render_socket(
     """
     with leave_nothing_behind():
         copy = material.copy()
-        output = _lifted(copy.node_tree, socket, scope)
+        output = exposed_in_groups(copy.node_tree, socket, scope)
         tree = copy.node_tree
         emission, target = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeOutputMaterial")
         tree.links.new(output, emission.inputs["Color"])
@@ -35,7 +35,9 @@ def render_socket(
         return _render(copy, edge, uv_map or "UVMap")
 
 
-def _lifted(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, scope: Scope | None) -> bpy.types.NodeSocket:
+def exposed_in_groups(
+    tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, scope: Scope | None
+) -> bpy.types.NodeSocket:
     """The socket of the copied material ``tree`` that carries ``socket``'s value.
 
     A socket inside node groups is led out through a new output of each, on copies of the groups.
@@ -75,5 +77,6 @@ def _render(material: bpy.types.Material, edge: int, uv_map: str) -> np.ndarray:
     scene.camera.data.ortho_scale = 1.0
     plain_render_settings(scene)
     unbiased_settings(scene, samples=1, bounces=0)
+    scene.render.use_persistent_data = False  # Cycles would look for this scene when it is gone
     scene.render.resolution_x = scene.render.resolution_y = edge
     return render_pixels(scene, scene.view_layers[0].name)

@@ -7,7 +7,8 @@ instances are transformed together in float64.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
@@ -26,6 +27,9 @@ class MeshArrays:
     slots: np.ndarray  # (T,) int32 material slot
     uv_maps: dict[str, np.ndarray]  # name -> (T, 3, 2) float32
     active_uv_map: str  # "" where the mesh has none
+    attributes: dict[str, np.ndarray] = field(default_factory=dict)  # those asked for -> (T, 3, 1 to 4) float32
+    texture_location: np.ndarray = field(default_factory=lambda: np.zeros(3))  # of Generated coordinates
+    texture_size: np.ndarray = field(default_factory=lambda: np.ones(3))
     not_finite: int = 0  # triangles dropped because a corner is NaN or infinite
     needles: int = 0  # triangles dropped because they have no area
 
@@ -40,9 +44,11 @@ class WorldTriangles:
     corner_uvs: np.ndarray  # (I·T, 3, 2) float32
 
 
-def read_mesh(mesh: bpy.types.Mesh) -> MeshArrays:
+def read_mesh(mesh: bpy.types.Mesh, attributes: Iterable[str] = ()) -> MeshArrays:
     """Read an evaluated mesh. Triangles without area and those with a corner that is not finite are dropped and
     counted.
+
+    ``attributes`` names those that its materials ask for, "" the colours that renders show.
     """
     vertices = (
         _read(mesh.attributes["position"].data, "vector", (len(mesh.vertices), 3), np.float32)
@@ -62,6 +68,9 @@ def read_mesh(mesh: bpy.types.Mesh) -> MeshArrays:
         slots=_material_slots(mesh, faces),
         uv_maps={layer.name: _uv_map(mesh, layer.name)[corners] for layer in mesh.uv_layers},
         active_uv_map=next((layer.name for layer in mesh.uv_layers if layer.active_render), ""),
+        attributes=_attributes(mesh, attributes, corner_vertices, corners, faces),
+        texture_location=np.array(mesh.texspace_location, float),
+        texture_size=np.array(mesh.texspace_size, float),
     )
     _drop_unusable(arrays)
     return arrays
@@ -142,6 +151,42 @@ def _uv_map(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
     return np.nan_to_num(uvs, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
 
 
+# How the values of an attribute are read: property of its elements and channels.
+_VALUES = {
+    "FLOAT": ("value", 1),
+    "INT": ("value", 1),
+    "INT8": ("value", 1),
+    "BOOLEAN": ("value", 1),
+    "FLOAT2": ("vector", 2),
+    "FLOAT_VECTOR": ("vector", 3),
+    "FLOAT_COLOR": ("color", 4),
+    "BYTE_COLOR": ("color", 4),
+}
+
+
+def _attributes(mesh, names: Iterable[str], corner_vertices, corners, faces) -> dict[str, np.ndarray]:
+    """(T, 3, channels) float32 of those of ``names`` that ``mesh`` has, linear where they are colours."""
+    found = {}
+    for name in names:
+        index = mesh.color_attributes.render_color_index
+        layer = mesh.attributes.get(name) if name else None
+        if not name and 0 <= index < len(mesh.color_attributes):
+            layer = mesh.color_attributes[index]
+        if layer is None or layer.data_type not in _VALUES:
+            continue
+        attribute, channels = _VALUES[layer.data_type]
+        kind = {"INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}.get(layer.data_type, np.float32)
+        values = _read(layer.data, attribute, (len(layer.data), channels), kind).astype(np.float32)
+        values = np.nan_to_num(values, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
+        if layer.domain == "POINT":
+            found[name] = values[corner_vertices[corners]]
+        elif layer.domain == "CORNER":
+            found[name] = values[corners]
+        elif layer.domain == "FACE":
+            found[name] = np.repeat(values[faces][:, None], 3, axis=1)
+    return found
+
+
 def _drop_unusable(mesh: MeshArrays) -> None:
     """Remove triangles that are not finite or have no area, and the vertices that are not finite."""
     finite = np.isfinite(mesh.vertices).all(axis=1)
@@ -156,6 +201,7 @@ def _drop_unusable(mesh: MeshArrays) -> None:
         mesh.triangles, mesh.slots = mesh.triangles[usable], mesh.slots[usable]
         mesh.corner_normals = mesh.corner_normals[usable]
         mesh.uv_maps = {name: uvs[usable] for name, uvs in mesh.uv_maps.items()}
+        mesh.attributes = {name: values[usable] for name, values in mesh.attributes.items()}
     if not finite.all():
         mesh.triangles = (np.cumsum(finite, dtype=np.int32) - 1)[mesh.triangles]
         mesh.vertices = mesh.vertices[finite]

@@ -19,7 +19,9 @@ from .notices import Notices
 from .procedurals import sampler_of
 from .shader_nodes import NodeEvaluator
 from .shader_values import ONE, Domain, Value, apply, constant
+from .surface_parts import SurfaceParts
 from .surface_shaders import DEFAULT_GREY, HOLE, Closure, evaluate_shader
+from .surface_values import SurfaceEvaluator
 
 CLIP_THRESHOLD = 0.5
 
@@ -27,11 +29,12 @@ CLIP_THRESHOLD = 0.5
 class MaterialTable:
     """Reads materials on demand and keeps them in the order of ``SceneSnapshot.materials``."""
 
-    def __init__(self, images: ImageTable, notices: Notices):
+    def __init__(self, images: ImageTable, notices: Notices, surfaces: SurfaceParts | None = None):
         self.materials: list[Material] = []
         self.domains: list[Domain] = []  # the texture mapping of each material, to be applied to its corners' UVs
         self._images = images
         self._notices = notices
+        self._surfaces = surfaces
         self._indices: dict[tuple[int, float], int] = {}
 
     def index(self, material: bpy.types.Material | None, intensity: float = 1.0) -> int:
@@ -65,9 +68,6 @@ class MaterialTable:
     def _closure(self, material: bpy.types.Material) -> Closure:
         if material.node_tree is None or not material.use_nodes:
             return Closure(constant(material.diffuse_color[:3]), constant(1.0))  # type: ignore[index]
-        evaluator = NodeEvaluator(
-            f"material '{material.name}'", self._images, self._notices, material.name, sampler_of(material)
-        )
         output = active_output(material.node_tree, "ShaderNodeOutputMaterial")
         if output is None:
             self._notices.group("materials without an output node are black", material.name)
@@ -78,10 +78,36 @@ class MaterialTable:
             if not surface.is_linked:
                 return HOLE
         try:
-            return evaluate_shader(evaluator, surface)
+            return self._evaluated(material, surface)
         except Unsupported as reason:
             self._notices.append(f"material '{material.name}': {reason}; default grey is used")
             return Closure(DEFAULT_GREY)
+
+    def _evaluated(self, material: bpy.types.Material, surface: bpy.types.NodeSocket) -> Closure:
+        """The closure at ``surface``: on UV maps where they can carry its pattern, else on an atlas of its own.
+
+        Raises:
+            Unsupported: see ``evaluate_shader``.
+        """
+        owner = f"material '{material.name}'"
+        notices = Notices()
+        evaluator = NodeEvaluator(owner, self._images, notices, material.name, sampler_of(material))
+        closure = evaluate_shader(evaluator, surface)
+        placed = {
+            value.domain
+            for value in (closure.diffuse, closure.opacity, closure.emission)
+            if not value.is_constant
+        }
+        samples = None
+        if evaluator.loses_pattern or len(placed) > 1:
+            samples = self._surfaces.samples(material) if self._surfaces is not None else None
+        if samples is not None:
+            notices = Notices()
+            closure = evaluate_shader(
+                SurfaceEvaluator(owner, self._images, notices, material.name, material, samples), surface
+            )
+        self._notices.extend(notices)
+        return closure
 
     def _append(self, name: str, closure: Closure, threshold: float, backface_culling: bool) -> None:
         opacity = _solid_where_opaque(closure.opacity, threshold)

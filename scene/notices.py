@@ -20,6 +20,11 @@ class Notices:
         """A warning that many things may share; they are listed behind it."""
         self._names.setdefault(reason, {})[name] = None
 
+    def extend(self, other: Notices) -> None:
+        """All that ``other`` collected."""
+        for reason, names in other._names.items():
+            self._names.setdefault(reason, {}).update(names)
+
     def lines(self) -> list[str]:
         result = []
         for reason, names in self._names.items():

@@ -61,6 +61,7 @@ def sampler_of(material: bpy.types.Material):
             else "procedural textures enter with their mean colour"
         )
         if origins:  # without any, the node only computes
+            evaluator.loses_pattern |= not placed
             evaluator.notices.group(reason, f"{evaluator.owner_name} > {socket.node.name}")
         return Value(np.ones(1, np.float32), pixels, Domain(uv_map) if placed else SCATTERED)
 

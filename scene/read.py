@@ -16,6 +16,9 @@ from .images import ImageTable
 from .lights import INTENSITY_PROPERTY, LightTable
 from .materials import MaterialTable, apply_domain
 from .notices import Notices
+from .surface_parts import SurfaceParts
+from .surface_samples import InstanceFacts
+from .surface_values import ATLAS, Wants, wants
 from .volumes import find_volumes
 from .world import read_world
 
@@ -29,6 +32,10 @@ _WITHOUT_SURFACE = {
 }
 
 
+_UINT_MAX = 0xFFFFFFFF
+_MOST_ALONE = 64  # instances of meshes whose materials tell them apart; the rest look like the last one
+
+
 @dataclass
 class _Instances:
     """All instances of one mesh with one set of materials."""
@@ -36,6 +43,7 @@ class _Instances:
     mesh: MeshArrays
     materials: list[bpy.types.Material | None]  # per slot, original datablocks
     intensity: float  # factor on emission
+    facts: InstanceFacts  # of the first one
     matrices: list[np.ndarray] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
 
@@ -45,7 +53,9 @@ class _Harvest:
     """What has to be taken out of the depsgraph while it lives."""
 
     groups: dict[tuple, _Instances] = field(default_factory=dict)
-    meshes: dict[int, MeshArrays] = field(default_factory=dict)
+    meshes: dict[tuple, MeshArrays] = field(default_factory=dict)
+    wants: dict[int, Wants] = field(default_factory=dict)  # by material
+    alone: int = 0  # instances so far of meshes whose materials tell them apart
     lights: list[tuple[bpy.types.Object, np.ndarray, str]] = field(default_factory=list)
 
 
@@ -110,13 +120,16 @@ def _read(scene, view_layer, evaluate, world: World | None = None) -> SceneSnaps
         lambda depsgraph: _harvest(depsgraph, rendered_objects(view_layer), scene.rigidbody_world is not None, notices),
     )
     images = ImageTable(notices)
-    materials = MaterialTable(images, notices)
+    surfaces = SurfaceParts()
+    materials = MaterialTable(images, notices, surfaces)
     override = view_layer.material_override
+    for group in harvest.groups.values():
+        group.materials = [override] if override else group.materials or [None]
+        surfaces.add(group, group.materials)
     parts = []
     object_names: list[str] = []
     for group in harvest.groups.values():
-        slots = [override] if override else group.materials
-        part = _assemble(group, slots, materials, len(object_names), notices)
+        part = _assemble(group, surfaces, materials, len(object_names), notices)
         object_names += group.names
         if part is not None:
             parts.append(part)
@@ -168,7 +181,7 @@ def _harvest(
         elif item.type == "LIGHT":
             harvest.lights.append((item.original, matrix, name))
         elif _receives_diffuse_rays(item, notices):
-            _add_mesh(harvest, item, matrix, name, notices)
+            _add_mesh(harvest, item, instance, matrix, name, notices)
     return harvest
 
 
@@ -186,11 +199,14 @@ def _receives_diffuse_rays(item: bpy.types.Object, notices: Notices) -> bool:
     return True
 
 
-def _add_mesh(harvest: _Harvest, item: bpy.types.Object, matrix: np.ndarray, name: str, notices: Notices) -> None:
+def _add_mesh(harvest: _Harvest, item, instance, matrix: np.ndarray, name: str, notices: Notices) -> None:
     mesh = item.data
-    key = mesh.as_pointer()
+    slots = _slot_materials(item, mesh)
+    asked = [_wants(harvest, material) for material in slots]
+    attributes = frozenset().union(*(one.attributes for one in asked))
+    key = (mesh.as_pointer(), attributes)
     if key not in harvest.meshes:
-        arrays = harvest.meshes[key] = read_mesh(mesh)
+        arrays = harvest.meshes[key] = read_mesh(mesh, sorted(attributes))
         if arrays.not_finite:
             notices.append(
                 f"object '{name}': {arrays.not_finite} triangles have corners that are not finite and are left out; "
@@ -198,14 +214,62 @@ def _add_mesh(harvest: _Harvest, item: bpy.types.Object, matrix: np.ndarray, nam
             )
         if arrays.needles:
             notices.group("triangles without area are left out", f"{name} ({arrays.needles})")
-    slots = _slot_materials(item, mesh)
     intensity = float(item.get(INTENSITY_PROPERTY, 1.0))
-    group_key = (key, intensity, *(material.as_pointer() if material else 0 for material in slots))
+    alone = -1
+    if any(one.instance for one in asked):
+        alone = harvest.alone = min(harvest.alone + 1, _MOST_ALONE)
+    group_key = (key, intensity, alone, *(material.as_pointer() if material else 0 for material in slots))
     group = harvest.groups.get(group_key)
     if group is None:
-        group = harvest.groups[group_key] = _Instances(harvest.meshes[key], slots, intensity)
+        facts = _facts(item, instance, frozenset().union(*(one.properties for one in asked)))
+        group = harvest.groups[group_key] = _Instances(harvest.meshes[key], slots, intensity, facts)
     group.matrices.append(matrix)
     group.names.append(name)
+
+
+def _wants(harvest: _Harvest, material: bpy.types.Material | None) -> Wants:
+    key = material.as_pointer() if material is not None else 0
+    if key not in harvest.wants:
+        harvest.wants[key] = wants(material)
+    return harvest.wants[key]
+
+
+def _facts(item: bpy.types.Object, instance, properties: frozenset[str]) -> InstanceFacts:
+    found = {}
+    for name in properties:
+        value = item.get(name, item.data.get(name))
+        try:
+            found[name] = tuple(float(one) for one in np.atleast_1d(value)) if value is not None else (0.0,)
+        except (TypeError, ValueError):  # text, or a datablock
+            found[name] = (0.0,)
+    return InstanceFacts(
+        location=tuple(instance.matrix_world.translation),
+        color=tuple(item.color),
+        index=float(item.pass_index),
+        random=((instance.random_id & _UINT_MAX) or _random_of_name(item.name)) / _UINT_MAX,
+        properties=found,
+    )
+
+
+def _random_of_name(name: str) -> int:
+    """The random number that Cycles gives an object that is no instance: Jenkins' hash (lookup3) of its name's hash."""
+    key = 0
+    for byte in name.encode():
+        key = (key * 37 + byte) & _UINT_MAX
+    a = b = c = (0xDEADBEEF + 8 + 13) & _UINT_MAX
+    a = (a + key) & _UINT_MAX
+    for which, turn in enumerate((14, 11, 25, 16, 4, 14, 24)):
+        if which % 3 == 0:
+            c = ((c ^ b) - _rotated(b, turn)) & _UINT_MAX
+        elif which % 3 == 1:
+            a = ((a ^ c) - _rotated(c, turn)) & _UINT_MAX
+        else:
+            b = ((b ^ a) - _rotated(a, turn)) & _UINT_MAX
+    return c
+
+
+def _rotated(value: int, bits: int) -> int:
+    return ((value << bits) | (value >> (32 - bits))) & _UINT_MAX
 
 
 def _slot_materials(item: bpy.types.Object, mesh: bpy.types.Mesh) -> list[bpy.types.Material | None]:
@@ -218,12 +282,18 @@ def _slot_materials(item: bpy.types.Object, mesh: bpy.types.Mesh) -> list[bpy.ty
     return [material.original if material else None for material in materials]
 
 
-def _assemble(group: _Instances, slots, materials: MaterialTable, first_object: int, notices: Notices) -> dict | None:
+def _assemble(
+    group: _Instances, surfaces: SurfaceParts, materials: MaterialTable, first_object: int, notices: Notices
+) -> dict | None:
     """World triangles of ``group`` with their per-triangle arrays; None where nothing is left."""
     mesh = group.mesh
-    rows = np.array([materials.index(material, group.intensity) for material in slots or [None]], np.int32)
+    rows = np.array([materials.index(material, group.intensity) for material in group.materials], np.int32)
     used = rows[np.clip(mesh.slots, 0, len(rows) - 1)]
     uvs = _corner_uvs(mesh, used, materials, group.names[0], notices)
+    for row, material in zip(rows, group.materials):
+        if materials.domains[row] == ATLAS and (used == row).any():
+            chosen, own = surfaces.corner_uvs(material, group)
+            uvs[chosen] = own
     visible = ~np.isin(used, [row for row in np.unique(used) if materials.is_hole(row)])
     if not visible.any():
         return None
@@ -253,6 +323,8 @@ def _corner_uvs(
         if not materials.is_textured(row):
             continue
         domain = materials.domains[row]
+        if domain == ATLAS:
+            continue
         source = mesh.uv_maps.get(domain.uv_map or mesh.active_uv_map)
         if source is None:
             notices.group(

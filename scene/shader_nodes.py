@@ -11,11 +11,12 @@ import bpy
 import numpy as np
 
 from . import shader_math
+from .albedos import fresnel_mean
 from .blackbody import blackbody_color
 from .images import ImageTable
 from .node_links import Reported, Scope, Unsupported, find_socket, resolve
 from .notices import Notices
-from .shader_values import SCATTERED, ZERO, Value, apply, as_number, blend, constant, mixed_domains
+from .shader_values import ONE, SCATTERED, ZERO, Value, apply, as_number, blend, constant, mixed_domains
 from .texture_coordinates import domain_of
 
 # Light Path outputs as a diffuse ray after its first bounce sees them.
@@ -44,6 +45,7 @@ class NodeEvaluator:
         self.owner_name = owner_name
         self.images = images
         self.notices = notices
+        self.loses_pattern = False  # something that changes over the surface entered with one value
         self._values: dict[tuple, Value] = {}
 
     def input(self, node: bpy.types.Node, name: str, scope: Scope | None) -> Value:
@@ -56,6 +58,7 @@ class NodeEvaluator:
         try:
             value = self.output(source, source_scope) if source.is_output else default_value(source)
         except Unsupported as reason:
+            self.loses_pattern = True
             if not isinstance(reason, Reported):
                 self.notices.append(
                     f"{self.owner}: node '{source.node.name}' feeding '{socket.name}' of '{node.name}' is not "
@@ -93,6 +96,7 @@ class NodeEvaluator:
         """``function`` of the named inputs, with a warning where textures with different mappings meet."""
         values = [self.input(node, name, scope) for name in names]
         if mixed_domains(*values):
+            self.loses_pattern = True
             self.notices.append(
                 f"{self.owner}: node '{node.name}' joins textures with different mappings; "
                 "only one keeps its pattern, the others are averaged"
@@ -139,6 +143,7 @@ def _image_texture(evaluator, node, socket, scope):
             raise Unsupported(f"{node.projection.lower()} projection")
         domain = domain_of(evaluator, find_socket(node.inputs, "Vector"), scope, node.extension)
     except Unsupported as reason:
+        evaluator.loses_pattern = True
         evaluator.notices.append(
             f"{owner}: the mapping of image '{node.image.name}' is not supported ({reason}); its mean colour is used"
         )
@@ -205,6 +210,7 @@ def _mixed(evaluator, node, scope, names, blend_type, clamp_factor, clamp_result
         if second.is_constant:
             return first.scaled(second.scale)
     if mixed_domains(factor, first, second):
+        evaluator.loses_pattern = True
         evaluator.notices.append(
             f"{evaluator.owner}: node '{node.name}' joins textures with different mappings; "
             "only one keeps its pattern, the others are averaged"
@@ -327,27 +333,33 @@ def _geometry(evaluator, node, socket, scope):
     raise Unsupported(f"'{socket.name}' differs from point to point")
 
 
-def _fresnel_mean(ior: float) -> float:
-    """Cosine-weighted mean reflectance of a dielectric. E. d'Eon's fit, good to 0.1 % for 1 < ior < 2.5."""
-    return (ior - 1) / (4.08567 + 1.00071 * ior) if ior > 1 else 0.0
-
-
 def _fresnel(evaluator, node, socket, scope):
-    return constant(_fresnel_mean(evaluator.input(node, "IOR", scope).number()))
+    return constant(fresnel_mean(evaluator.input(node, "IOR", scope).number()))
+
+
+def layer_weight_mean(blend_input: float, output: str) -> float:
+    """Cosine-weighted mean of the Layer Weight node's ``output``."""
+    weight = float(np.clip(blend_input, 0, 0.999))
+    if output == "Fresnel":
+        return fresnel_mean(1 / max(1 - weight, 1e-5))
+    exponent = 2 * weight if weight < 0.5 else 0.5 / (1 - weight)
+    return 1 - 2 / (exponent + 2)  # mean of 1 − cosᵉ under the cosine
 
 
 def _layer_weight(evaluator, node, socket, scope):
-    weight = float(np.clip(evaluator.input(node, "Blend", scope).number(), 0, 0.999))
-    if socket.name == "Fresnel":
-        return constant(_fresnel_mean(1 / max(1 - weight, 1e-5)))
-    exponent = 2 * weight if weight < 0.5 else 0.5 / (1 - weight)
-    return constant(1 - 2 / (exponent + 2))  # mean of 1 − cosᵉ under the cosine
+    return constant(layer_weight_mean(evaluator.input(node, "Blend", scope).number(), socket.name))
 
 
 def _object_info(evaluator, node, socket, scope):
     if socket.name == "Random":
+        evaluator.loses_pattern = True
         return constant(0.5)
     raise Unsupported(f"'{socket.name}' differs from object to object")
+
+
+def _ambient_occlusion(evaluator, node, socket, scope):
+    """As if nothing were near: light transport knows what is."""
+    return evaluator.input(node, "Color", scope) if socket.name == "Color" else ONE
 
 
 def _light_falloff(evaluator, node, socket, scope):
@@ -395,5 +407,6 @@ _NODES = {
     "ShaderNodeFresnel": _fresnel,
     "ShaderNodeLayerWeight": _layer_weight,
     "ShaderNodeObjectInfo": _object_info,
+    "ShaderNodeAmbientOcclusion": _ambient_occlusion,
     "ShaderNodeLightFalloff": _light_falloff,
 }

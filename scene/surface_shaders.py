@@ -4,12 +4,11 @@
 What each closure becomes is chosen so that the light that leaves the surface, summed over all directions, is as close
 to Cycles as a diffuse reflector with holes can be:
 
-- Diffuse, Subsurface, Toon, Sheen, Translucent: their colour reflects diffusely. Glossy nodes too: the energy is right,
-  the direction is spread.
-- Principled: base colour × (1 − metallic) × (1 − transmission); coat, sheen and the few percent of specular are left
-  out. Metal therefore reflects nothing, which is said in a warning.
-- Glass, Refraction and Principled with more than half transmission let light through unbent and uncoloured: a hole.
-  Thin panes are what such materials mostly are, and caustics of solid glass are beyond a light probe.
+- Diffuse, Subsurface, Toon, Sheen, Translucent reflect diffusely what they send back in all. So do glossy nodes, metal
+  and the specular and coat layers of Principled (``albedos``): the energy is right, the direction is spread, which a
+  warning says where it matters. Black metal instead was 70 % too dark in a room with walls of it, this is 3 % too bright.
+- Glass, Refraction and the transmitting part of Principled let light through unbent and uncoloured: a hole. Thin panes
+  are what such materials mostly are, and caustics of solid glass are beyond a light probe.
 - Mix Shader and Add Shader combine these per pixel. Normal inputs are ignored; they turn light, they do not make it.
 """
 
@@ -20,6 +19,15 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
+from .albedos import (
+    dielectric_albedo,
+    glossy_albedo,
+    layered,
+    metal_albedo,
+    rough_diffuse_albedo,
+    sheen_albedo,
+    tinted_coat,
+)
 from .node_links import Scope, Unsupported, find_socket, resolve
 from .shader_nodes import NodeEvaluator
 from .shader_values import ONE, ZERO, Value, add, apply, blend, complement, constant, multiply
@@ -68,26 +76,38 @@ def _as_color(value: Value) -> Value:
 
 
 def _principled(evaluator, node, scope):
+    """The layers of Cycles' Principled BSDF from the inside out, each with its mean albedo."""
+
     def value(name):
         return evaluator.input(node, name, scope)
 
-    metallic, transmission = value("Metallic"), value("Transmission Weight").number()
-    diffuse = value("Base Color")
+    roughness, metallic = value("Roughness").number(), _unit(value("Metallic"))
+    through = _unit(value("Transmission Weight"))
+    share = dielectric_albedo(value("IOR").number(), roughness, value("Specular IOR Level").number())
+    albedo = rough_diffuse_albedo(value("Base Color"), value("Diffuse Roughness").number())
+    albedo = layered(value("Specular Tint").scaled(share), share, albedo)
     if not metallic.is_zero():
-        diffuse = multiply(diffuse, complement(metallic))
-        if metallic.number() > 0.5:
-            evaluator.notices.group(
-                "metallic materials reflect no diffuse light and so look dark to the probes", evaluator.owner_name
-            )
-    opacity = value("Alpha")
-    if transmission > 0.5:
+        evaluator.notices.group("metal reflects its colour in all directions", evaluator.owner_name)
+        albedo = blend(metallic, albedo, metal_albedo(value("Base Color"), roughness))
+    opacity = _unit(value("Alpha"))
+    if not through.is_zero():
         evaluator.notices.group("glass lets light through unbent and uncoloured", evaluator.owner_name)
-        opacity = ZERO
-    elif transmission > 0:
-        diffuse = diffuse.scaled(1 - transmission)
+        opacity = apply(lambda a, t, m: a * (1 - t * (1 - m)), opacity, through, metallic)
+    coat = _unit(value("Coat Weight"))
+    if not coat.is_zero():
+        share = coat.number() * dielectric_albedo(value("Coat IOR").number(), value("Coat Roughness").number())
+        albedo = layered(constant(share), share, tinted_coat(albedo, coat, value("Coat Tint")))
+    sheen = _unit(value("Sheen Weight"))
+    if not sheen.is_zero():
+        share = sheen.number() * sheen_albedo(value("Sheen Roughness").number())
+        albedo = layered(value("Sheen Tint").scaled(share), share, albedo)
     strength = value("Emission Strength")
     emission = Closure.emission if strength.is_zero() else multiply(value("Emission Color"), strength)
-    return Closure(diffuse, opacity, emission)
+    return Closure(albedo, opacity, emission)
+
+
+def _unit(value: Value) -> Value:
+    return apply(lambda array: np.clip(array, 0, 1), value)
 
 
 def _eevee_specular(evaluator, node, scope):
@@ -104,8 +124,25 @@ def _diffuse(evaluator, node, scope):
 
 def _glossy(evaluator, node, scope):
     evaluator.notices.group("glossy shaders reflect their colour in all directions", evaluator.owner_name)
-    name = "Color" if find_socket(node.inputs, "Color") is not None else "Base Color"
-    return Closure(evaluator.input(node, name, scope))
+    roughness = evaluator.input(node, "Roughness", scope).number()
+    if node.bl_idname == "ShaderNodeBsdfMetallic":
+        color = evaluator.input(node, "Base Color", scope)
+        if getattr(node, "fresnel_type", "") == "PHYSICAL_CONDUCTOR":
+            evaluator.notices.group("physical conductors reflect a mean grey", evaluator.owner_name)
+            color = constant([0.57, 0.53, 0.5])
+        return Closure(metal_albedo(color, roughness))
+    color = evaluator.input(node, "Color", scope)
+    return Closure(glossy_albedo(color, roughness, getattr(node, "distribution", "") == "MULTI_GGX"))
+
+
+def _sheen(evaluator, node, scope):
+    albedo = sheen_albedo(evaluator.input(node, "Roughness", scope).number())
+    return Closure(evaluator.input(node, "Color", scope).scaled(albedo))
+
+
+def _rough_diffuse(evaluator, node, scope):
+    roughness = evaluator.input(node, "Roughness", scope).number()
+    return Closure(rough_diffuse_albedo(evaluator.input(node, "Color", scope), roughness))
 
 
 def _translucent(evaluator, node, scope):
@@ -183,10 +220,10 @@ def _add(evaluator, node, scope):
 _SHADERS = {
     "ShaderNodeBsdfPrincipled": _principled,
     "ShaderNodeEeveeSpecular": _eevee_specular,
-    "ShaderNodeBsdfDiffuse": _diffuse,
+    "ShaderNodeBsdfDiffuse": _rough_diffuse,
     "ShaderNodeSubsurfaceScattering": _diffuse,
     "ShaderNodeBsdfToon": _diffuse,
-    "ShaderNodeBsdfSheen": _diffuse,
+    "ShaderNodeBsdfSheen": _sheen,
     "ShaderNodeBsdfTranslucent": _translucent,
     "ShaderNodeBsdfAnisotropic": _glossy,
     "ShaderNodeBsdfGlossy": _glossy,

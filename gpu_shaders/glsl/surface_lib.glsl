@@ -14,7 +14,7 @@ vec3 interpolate(vec3 a, vec3 b, vec3 c, vec2 barycentric)
 }
 
 #ifdef HAS_IMAGES
-const int REPEAT = 0, EXTEND = 1, CLIP = 2, MIRROR = 3;
+const int REPEAT = 0, EXTEND = 1, CLIP = 2, MIRROR = 3, ATLAS = 4;
 
 int wrap_texel(int i, int size, int extension)
 {
@@ -39,6 +39,7 @@ vec4 sample_image(int image, vec2 uv, float footprint)
   }
   int start = int(entry.x) * 4096;
   int level = int(clamp(log2(max(footprint * float(max(size.x, size.y)), 1.0)) + 0.5, 0.0, 16.0));
+  level = extension == ATLAS ? 0 : level; /* neighbours there are neighbours nowhere else */
   for (int i = 0; i < level && max(size.x, size.y) > 1; i++) {
     start += size.x * size.y;
     size = max(size / 2, ivec2(1));
