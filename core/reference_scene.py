@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import rays
+from .dithering import dither_threshold
 from .images import sample_image
-from .snapshot import NO_IMAGE, SceneSnapshot
+from .snapshot import DITHERED, NO_IMAGE, SceneSnapshot
 
 
 @dataclass
@@ -58,7 +59,10 @@ class ReferenceScene:
             if material.alpha_image != NO_IMAGE and len(here):
                 texel = self._image(material.alpha_image, triangle[here], barycentric[here])
                 alpha *= texel[:, :3].mean(axis=1) if material.alpha_from_color else texel[:, 3]
-            hole[here] = alpha < material.alpha_threshold
+            threshold = material.alpha_threshold
+            if threshold >= DITHERED:
+                threshold = dither_threshold(triangle[here], barycentric[here])
+            hole[here] = alpha < threshold
         return hole
 
     def emission(self, triangle: np.ndarray, barycentric: np.ndarray) -> np.ndarray:

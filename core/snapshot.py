@@ -15,6 +15,7 @@ import numpy as np
 from .camera import Camera
 
 NO_IMAGE = -1
+DITHERED = 2.0  # an ``alpha_threshold`` above what alpha can be: every place has one of its own, by chance
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,9 @@ class Image:
 
     name: str
     pixels: np.ndarray
-    extension: str = "REPEAT"  # REPEAT | EXTEND | CLIP | MIRROR, as in Blender's image texture node; ATLAS: never mipped
+    extension: str = (
+        "REPEAT"  # REPEAT | EXTEND | CLIP | MIRROR, as in Blender's image texture node; ATLAS: never mipped
+    )
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,8 @@ class Material:
 
     The reflected part is ``base_color × base texture × diffuse_share``: ``diffuse_share`` is what is left after
     metallic, transmission and mix weights took theirs. Emission is ``emission × emission texture`` and is
-    radiance. A texel with alpha below ``alpha_threshold`` is a hole (0: no clip).
+    radiance. A texel with alpha below ``alpha_threshold`` is a hole (0: no clip; DITHERED: with the chance 1 − alpha,
+    see ``core.dithering``).
     """
 
     name: str

@@ -243,6 +243,7 @@ def _attributes(
     rows[:, 3] = uvs[:, :2].reshape(-1, 4)
     rows[:, 4, :2] = uvs[:, 2]
     rows[:, 4, 2] = density
+    rows[:, 4, 3] = order
     return rows
 
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ..core.snapshot import NO_IMAGE, Material
+from ..core.snapshot import DITHERED, NO_IMAGE, Material
 from .images import ImageTable
 from .node_links import Unsupported, active_output, find_socket
 from .notices import Notices
@@ -23,7 +23,7 @@ from .surface_parts import SurfaceParts
 from .surface_shaders import DEFAULT_GREY, HOLE, Closure, evaluate_shader
 from .surface_values import SurfaceEvaluator
 
-CLIP_THRESHOLD = 0.5
+_LEAST_OPACITY = 1e-3  # less is no surface, and what misses less than this of 1 is solid
 
 
 class MaterialTable:
@@ -49,16 +49,16 @@ class MaterialTable:
         elif key not in self._indices:
             self._indices[key] = len(self.materials)
             if material is None:
-                self._append("", Closure(DEFAULT_GREY), CLIP_THRESHOLD, False)
+                self._append("", Closure(DEFAULT_GREY), False)
             else:
                 culls = bool(material.use_backface_culling)
-                self._append(material.name, self._closure(material), _threshold(material), culls)
+                self._append(material.name, self._closure(material), culls)
         return self._indices[key]
 
     def is_hole(self, index: int) -> bool:
         """Whether nothing of the surface is left: light passes everywhere."""
         material = self.materials[index]
-        return material.alpha_image == NO_IMAGE and material.alpha < material.alpha_threshold
+        return material.alpha_image == NO_IMAGE and material.alpha < _LEAST_OPACITY
 
     def is_textured(self, index: int) -> bool:
         """Whether the surface samples any image."""
@@ -94,9 +94,7 @@ class MaterialTable:
         evaluator = NodeEvaluator(owner, self._images, notices, material.name, sampler_of(material))
         closure = evaluate_shader(evaluator, surface)
         placed = {
-            value.domain
-            for value in (closure.diffuse, closure.opacity, closure.emission)
-            if not value.is_constant
+            value.domain for value in (closure.diffuse, closure.opacity, closure.emission) if not value.is_constant
         }
         samples = None
         if evaluator.loses_pattern or len(placed) > 1:
@@ -109,8 +107,8 @@ class MaterialTable:
         self._notices.extend(notices)
         return closure
 
-    def _append(self, name: str, closure: Closure, threshold: float, backface_culling: bool) -> None:
-        opacity = _solid_where_opaque(closure.opacity, threshold)
+    def _append(self, name: str, closure: Closure, backface_culling: bool) -> None:
+        opacity = _solid_where_opaque(closure.opacity)
         placed = [
             value
             for value in (closure.diffuse, opacity, closure.emission)
@@ -121,12 +119,9 @@ class MaterialTable:
             self._in_domain(name, role, value, domain)
             for role, value in (("base colour", closure.diffuse), ("alpha", opacity), ("emission", closure.emission))
         )
-        if opacity.is_constant and opacity.number() < threshold and not emission.is_zero():
+        if opacity.is_constant and opacity.number() < _LEAST_OPACITY and not emission.is_zero():
             self._notices.group("emission on a transparent surface is kept and the surface blocks light", name)
             diffuse, opacity = constant([0.0, 0.0, 0.0]), ONE
-        elif opacity.is_constant and 0.001 < opacity.number() < 0.999:
-            verdict = "opaque" if opacity.number() >= threshold else "invisible"
-            self._notices.group(f"partial transparency is not supported: clipped at {threshold:g}, so {verdict}", name)
 
         if np.any(emission.scale < 0):
             self._notices.group("materials of negative emission take light away, as in Cycles", name)
@@ -141,7 +136,7 @@ class MaterialTable:
                 alpha_image=alpha_image,
                 emission_image=NO_IMAGE if emission.is_constant else self._add(f"{name} emission", emission, None),
                 alpha=opacity.number() if opacity.is_constant else 1.0,
-                alpha_threshold=0.0 if opacity.is_constant and opacity.number() >= threshold else threshold,
+                alpha_threshold=0.0 if opacity.is_constant and opacity.number() > 1 - _LEAST_OPACITY else DITHERED,
                 backface_culling=backface_culling,
             )
         )
@@ -191,14 +186,9 @@ def apply_domain(domain: Domain, corner_uvs: np.ndarray) -> np.ndarray:
     return (corner_uvs @ matrix[:, :2].T + matrix[:, 2]).astype(np.float32)
 
 
-def _threshold(material: bpy.types.Material) -> float:
-    """The alpha below which there is a hole; files from before 4.2 may hold their own."""
-    return float(material.alpha_threshold) if material.blend_method == "CLIP" else CLIP_THRESHOLD
-
-
-def _solid_where_opaque(opacity: Value, threshold: float) -> Value:
+def _solid_where_opaque(opacity: Value) -> Value:
     """Constant 1 for an alpha texture without holes, so that nobody samples it."""
-    if not opacity.is_constant and float(opacity.array().min()) >= threshold:
+    if not opacity.is_constant and float(opacity.array().min()) > 1 - _LEAST_OPACITY:
         return ONE
     return opacity
 

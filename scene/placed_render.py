@@ -11,11 +11,11 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from .albedos import fresnel_mean
 from .cycles_reference import unbiased_settings
 from .flat_render import exposed_in_groups
-from .node_links import Scope, Unsupported, find_socket
-from .albedos import fresnel_mean
-from .shader_nodes import DIFFUSE_RAY, layer_weight_mean
+from .node_links import Scope, Unsupported
+from .ray_nodes import DIFFUSE_RAY, layer_weight_mean
 from .surface_samples import SurfaceSamples
 from .temporary import leave_nothing_behind, new_camera, plain_render_settings, render_pixels
 
@@ -85,7 +85,13 @@ def place_of(node: bpy.types.Node, socket: bpy.types.NodeSocket) -> str | None:
             raise Unsupported(f"'{socket.name}' of Geometry")
         return names[socket.name]
     if kind == "ShaderNodeObjectInfo":
-        names = {"Location": "location", "Color": "color", "Alpha": "alpha", "Object Index": "index", "Random": "random"}
+        names = {
+            "Location": "location",
+            "Color": "color",
+            "Alpha": "alpha",
+            "Object Index": "index",
+            "Random": "random",
+        }
         return f"info {names[socket.name]}" if socket.name in names else None
     return None
 
@@ -226,7 +232,7 @@ def _render(mesh: bpy.types.Mesh, rows: int, columns: int) -> np.ndarray:
     scene.camera = new_camera(scene)
     scene.camera.location = (columns / 2, rows / 2, 2)
     scene.camera.data.type = "ORTHO"
-    scene.camera.data.ortho_scale = max(rows, columns)
+    scene.camera.data.ortho_scale = max(rows, columns)  # of the longer side of the picture
     plain_render_settings(scene)
     unbiased_settings(scene, samples=1, bounces=0)
     scene.render.use_persistent_data = False  # Cycles would look for this scene when it is gone

@@ -11,22 +11,13 @@ import bpy
 import numpy as np
 
 from . import shader_math
-from .albedos import fresnel_mean
 from .blackbody import blackbody_color
 from .images import ImageTable
 from .node_links import Reported, Scope, Unsupported, find_socket, resolve
 from .notices import Notices
-from .shader_values import ONE, SCATTERED, ZERO, Value, apply, as_number, blend, constant, mixed_domains
+from .ray_nodes import RAY_NODES
+from .shader_values import SCATTERED, Value, apply, as_number, blend, constant, mixed_domains
 from .texture_coordinates import domain_of
-
-# Light Path outputs as a diffuse ray after its first bounce sees them.
-DIFFUSE_RAY = {
-    "Is Diffuse Ray": 1.0,
-    "Is Reflection Ray": 1.0,
-    "Ray Length": 1.0,
-    "Ray Depth": 1.0,
-    "Diffuse Depth": 1.0,
-}
 
 
 class NodeEvaluator:
@@ -58,8 +49,8 @@ class NodeEvaluator:
         try:
             value = self.output(source, source_scope) if source.is_output else default_value(source)
         except Unsupported as reason:
-            self.loses_pattern = True
             if not isinstance(reason, Reported):
+                self.loses_pattern = True
                 self.notices.append(
                     f"{self.owner}: node '{source.node.name}' feeding '{socket.name}' of '{node.name}' is not "
                     f"supported ({reason}); that input's own value is used"
@@ -323,55 +314,6 @@ def _combine(evaluator, node, socket, scope):
     return evaluator.per_pixel(node, scope, function, *(item.identifier for item in node.inputs))
 
 
-def _light_path(evaluator, node, socket, scope):
-    return constant(DIFFUSE_RAY.get(socket.name, 0.0))
-
-
-def _geometry(evaluator, node, socket, scope):
-    if socket.name == "Backfacing":
-        return ZERO
-    raise Unsupported(f"'{socket.name}' differs from point to point")
-
-
-def _fresnel(evaluator, node, socket, scope):
-    return constant(fresnel_mean(evaluator.input(node, "IOR", scope).number()))
-
-
-def layer_weight_mean(blend_input: float, output: str) -> float:
-    """Cosine-weighted mean of the Layer Weight node's ``output``."""
-    weight = float(np.clip(blend_input, 0, 0.999))
-    if output == "Fresnel":
-        return fresnel_mean(1 / max(1 - weight, 1e-5))
-    exponent = 2 * weight if weight < 0.5 else 0.5 / (1 - weight)
-    return 1 - 2 / (exponent + 2)  # mean of 1 − cosᵉ under the cosine
-
-
-def _layer_weight(evaluator, node, socket, scope):
-    return constant(layer_weight_mean(evaluator.input(node, "Blend", scope).number(), socket.name))
-
-
-def _object_info(evaluator, node, socket, scope):
-    if socket.name == "Random":
-        evaluator.loses_pattern = True
-        return constant(0.5)
-    raise Unsupported(f"'{socket.name}' differs from object to object")
-
-
-def _ambient_occlusion(evaluator, node, socket, scope):
-    """As if nothing were near: light transport knows what is."""
-    return evaluator.input(node, "Color", scope) if socket.name == "Color" else ONE
-
-
-def _light_falloff(evaluator, node, socket, scope):
-    if (
-        socket.name == "Quadratic"
-        and not evaluator.linked(node, "Smooth", scope)
-        and evaluator.input(node, "Smooth", scope).is_zero()
-    ):
-        return evaluator.input(node, "Strength", scope)
-    raise Unsupported("only quadratic falloff without smoothing is physical")
-
-
 _NODES = {
     "ShaderNodeRGB": lambda e, node, socket, scope: constant(node.outputs[0].default_value[:3]),
     "ShaderNodeValue": lambda e, node, socket, scope: constant(node.outputs[0].default_value),
@@ -402,11 +344,5 @@ _NODES = {
     "ShaderNodeBlackbody": lambda e, node, socket, scope: constant(
         blackbody_color(e.input(node, "Temperature", scope).number())
     ),
-    "ShaderNodeLightPath": _light_path,
-    "ShaderNodeNewGeometry": _geometry,
-    "ShaderNodeFresnel": _fresnel,
-    "ShaderNodeLayerWeight": _layer_weight,
-    "ShaderNodeObjectInfo": _object_info,
-    "ShaderNodeAmbientOcclusion": _ambient_occlusion,
-    "ShaderNodeLightFalloff": _light_falloff,
+    **RAY_NODES,
 }

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-WIDTH = 1024
+_MOST_WIDTH = 1024
 MOST_TEXELS = 1 << 16  # unless two texels an edge, or one a triangle, take more
 _MOST_AT_CORNERS, _MOST_TRIANGLES = 1 << 18, 1 << 20
 _EDGES = np.array([2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128])
@@ -27,15 +27,15 @@ _EDGES = np.array([2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128])
 
 @dataclass(frozen=True)
 class Atlas:
-    """Which place of which triangle each texel shows. T triangles; ``shape`` is (rows, WIDTH)."""
+    """Which place of which triangle each texel shows; T triangles, P texels."""
 
-    shape: tuple[int, int]
+    shape: tuple[int, int]  # rows, columns
     corner_uvs: np.ndarray  # (T, 3, 2) float32
-    triangle: np.ndarray  # (rows · WIDTH,) int32; texels without one repeat the first triangle's
-    barycentric: np.ndarray  # (rows · WIDTH, 2) float32, weights of corners 1 and 2; outside 0..1 past the diagonal
+    triangle: np.ndarray  # (P,) int32; texels without one repeat the first triangle's
+    barycentric: np.ndarray  # (P, 2) float32, weights of corners 1 and 2; outside 0..1 past the diagonal
 
     def interpolate(self, corners: np.ndarray) -> np.ndarray:
-        """(rows · WIDTH, C) values at the texels of ``corners`` (T, 3, C)."""
+        """(P, C) values at the texels of ``corners`` (T, 3, C)."""
         u, v = self.barycentric[:, :1], self.barycentric[:, 1:]
         a, b, c = (corners[self.triangle, corner] for corner in range(3))
         return a * (1 - u - v) + b * u + c * v
@@ -47,32 +47,34 @@ def fits(count: int) -> bool:
 
 
 def lay_out(longest_edge: np.ndarray) -> Atlas:
-    """Squares for triangles whose longest edges are ``longest_edge`` (T,) metres, as many texels as the budget gives."""
+    """Squares for triangles whose longest edges are ``longest_edge`` (T,) metres, as fine as the budget allows."""
     edges = _texels_per_edge(longest_edge)
+    widest = int(edges.max())
+    width = min(-(-int(np.ceil(np.sqrt((edges * edges).sum()))) // widest) * widest, _MOST_WIDTH // widest * widest)
     x, y = np.zeros((2, len(edges)), np.int64)
     row = 0
     for edge in np.unique(edges)[::-1]:
         mine = np.flatnonzero(edges == edge)
-        per_shelf = WIDTH // edge
+        per_shelf = width // edge
         x[mine] = np.arange(len(mine)) % per_shelf * edge
         y[mine] = row + np.arange(len(mine)) // per_shelf * edge
         row += -(-len(mine) // per_shelf) * int(edge)
-    triangle = np.zeros(row * WIDTH, np.int32)
-    barycentric = np.zeros((row * WIDTH, 2), np.float32)
+    triangle = np.zeros(row * width, np.int32)
+    barycentric = np.zeros((row * width, 2), np.float32)
     for edge in np.unique(edges):
         mine = np.flatnonzero(edges == edge)
         j, i = np.divmod(np.arange(edge * edge), edge)
-        texel = (y[mine][:, None] + j) * WIDTH + x[mine][:, None] + i
+        texel = (y[mine][:, None] + j) * width + x[mine][:, None] + i
         triangle[texel] = mine[:, None]
         steps = max(int(edge) - 1, 1)
         place = np.stack([i, j], 1) / steps if edge > 1 else np.full((1, 2), 1 / 3)
         past = place.sum(axis=1) > 1 + 1.001 / steps
         barycentric[texel] = np.where(past[:, None], 1 - place, place)
-    size = np.array([WIDTH, row], float)
+    size = np.array([width, row], float)
     reach = (edges - 1)[:, None]
     first = np.stack([x, y], 1) + 0.5
     uvs = np.stack([first, first + reach * [1, 0], first + reach * [0, 1]], axis=1) / size
-    return Atlas((row, WIDTH), uvs.astype(np.float32), triangle, barycentric)
+    return Atlas((row, width), uvs.astype(np.float32), triangle, barycentric)
 
 
 def _texels_per_edge(longest_edge: np.ndarray) -> np.ndarray:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import bpy
 import numpy as np
 
 from .geometry import MeshArrays, place
@@ -40,9 +39,12 @@ class SurfaceSamples:
 
     def __init__(self, parts: list[Part]):
         self.parts = parts
+        self.missing: set[str] = set()  # attributes and UV maps that some mesh was asked for in vain
         self._counts = [int(part.chosen.sum()) for part in parts]
         self._known: dict[str, np.ndarray] = {}
-        corners = self._joined(lambda part: part.mesh.vertices[part.mesh.triangles[part.chosen]] @ part.matrix[:3, :3].T)
+        corners = self._joined(
+            lambda part: part.mesh.vertices[part.mesh.triangles[part.chosen]] @ part.matrix[:3, :3].T
+        )
         edges = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
         self.atlas: Atlas = lay_out(edges.max(axis=1))
 
@@ -52,8 +54,8 @@ class SurfaceSamples:
         return self.atlas.corner_uvs[start : start + self._counts[index]]
 
     def array(self, name: str) -> np.ndarray:
-        """(P, 1 or 3) float32. Names: ``position``, ``normal``, ``object``, ``generated``, ``object normal``; ``uv NAME``;
-        ``attribute NAME`` and ``alpha NAME``, where no name means the render colour; ``info WHAT`` with a field of
+        """(P, 1 or 3) float32. Names: ``position``, ``normal``, ``object``, ``generated``, ``object normal``;
+        ``uv NAME``;        ``attribute NAME`` and ``alpha NAME``, where no name means the render colour; ``info WHAT`` with a field of
         InstanceFacts or ``alpha``; ``property NAME`` of the object.
 
         Raises:
@@ -70,7 +72,14 @@ class SurfaceSamples:
             width = max(len(value) for value in values)
             rows = [np.resize(value, width) for value in values]
             return np.repeat(rows, self._counts, axis=0)[self.atlas.triangle]
-        return self.atlas.interpolate(self._joined(lambda part: _at_corners(part, kind, rest)))
+        return self.atlas.interpolate(self._joined(lambda part: self._at_corners(part, kind, rest)))
+
+    def _at_corners(self, part: Part, kind: str, rest: str) -> np.ndarray:
+        values = _at_corners(part, kind, rest)
+        if values is None:  # as Cycles has it: what is not there is black
+            self.missing.add(rest)
+            return np.zeros((int(part.chosen.sum()), 3, 1))
+        return values
 
     def _joined(self, of_part) -> np.ndarray:
         """(T, 3, C) of all parts; one channel stands for as many as others have."""
@@ -79,13 +88,14 @@ class SurfaceSamples:
         return np.concatenate([np.broadcast_to(array, (*array.shape[:-1], channels)) for array in arrays])
 
 
-def _at_corners(part: Part, kind: str, rest: str) -> np.ndarray:
-    """(T', 3, 1 or 3) values at the corners of the chosen triangles."""
+def _at_corners(part: Part, kind: str, rest: str) -> np.ndarray | None:
+    """(T', 3, 1 or 3) values at the corners of the chosen triangles; None where the mesh has none."""
     mesh, chosen = part.mesh, part.chosen
     if kind == "position":
         return mesh.vertices[mesh.triangles[chosen]] @ part.matrix[:3, :3].T + part.matrix[:3, 3]
     if kind == "normal":
-        return _upright(place(mesh, np.zeros((len(mesh.triangles), 3, 2), np.float32), part.matrix[None]).corner_normals, part)
+        no_uvs = np.zeros((len(mesh.triangles), 3, 2), np.float32)
+        return _upright(place(mesh, no_uvs, part.matrix[None]).corner_normals, part)
     if kind == "object":
         if rest == "normal":
             return mesh.corner_normals[chosen]
@@ -96,18 +106,18 @@ def _at_corners(part: Part, kind: str, rest: str) -> np.ndarray:
     if kind == "uv":
         uvs = mesh.uv_maps.get(rest or mesh.active_uv_map)
         if uvs is None:
-            return np.zeros((int(chosen.sum()), 3, 3))
+            return None
         return np.concatenate([uvs[chosen], np.zeros((int(chosen.sum()), 3, 1))], axis=2)
     if kind in ("attribute", "alpha"):
         values = mesh.attributes.get(rest)
         if values is None and rest in mesh.uv_maps:
             return _at_corners(part, "uv", rest) if kind == "attribute" else np.ones((int(chosen.sum()), 3, 1))
-        if values is None:  # as Cycles has it: what is not there is black and covers nothing
-            return np.zeros((int(chosen.sum()), 3, 1))
+        if values is None:
+            return None
         values = values[chosen]
         if kind == "alpha":
             return values[..., 3:] if values.shape[2] == 4 else np.ones((*values.shape[:2], 1))
-        return values[..., :3] if values.shape[2] >= 3 else np.pad(values, ((0, 0), (0, 0), (0, 3 - values.shape[2]))) if values.shape[2] == 2 else values
+        return np.pad(values, ((0, 0), (0, 0), (0, 1))) if values.shape[2] == 2 else values[..., :3]
     raise Unsupported(f"'{kind}' of a surface")
 
 

@@ -6,7 +6,8 @@ to Cycles as a diffuse reflector with holes can be:
 
 - Diffuse, Subsurface, Toon, Sheen, Translucent reflect diffusely what they send back in all. So do glossy nodes, metal
   and the specular and coat layers of Principled (``albedos``): the energy is right, the direction is spread, which a
-  warning says where it matters. Black metal instead was 70 % too dark in a room with walls of it, this is 3 % too bright.
+  warning says where it matters. Black instead left a room with metal walls 70 % too dark, this is 3 % too
+  bright.
 - Glass, Refraction and the transmitting part of Principled let light through unbent and uncoloured: a hole. Thin panes
   are what such materials mostly are, and caustics of solid glass are beyond a light probe.
 - Mix Shader and Add Shader combine these per pixel. Normal inputs are ignored; they turn light, they do not make it.
@@ -14,7 +15,7 @@ to Cycles as a diffuse reflector with holes can be:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -213,8 +214,15 @@ def _add(evaluator, node, scope):
     opacity = apply(
         lambda a, b: np.clip(a + b - 1, 0, 1), first.opacity, second.opacity
     )  # what both let through adds up
-    solid = first if second.opacity.is_zero() else second
-    return replace(solid, opacity=opacity, emission=emission)
+    diffuse = apply(
+        lambda a, b, c, d, o: np.where(o > 0, np.clip((a * b + c * d) / np.where(o > 0, o, 1), 0, 1), 0),
+        first.diffuse,
+        first.opacity,
+        second.diffuse,
+        second.opacity,
+        opacity,
+    )
+    return Closure(diffuse, opacity, emission)
 
 
 _SHADERS = {

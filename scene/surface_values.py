@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from .node_links import Scope, Unsupported, resolve
+from .node_links import Reported, Scope, Unsupported, resolve
 from .placed_render import place_of, render_places
 from .shader_nodes import NodeEvaluator
 from .shader_values import Domain, Value
@@ -34,7 +34,7 @@ class SurfaceEvaluator(NodeEvaluator):
         key = (socket.as_pointer(), scope)
         if key not in self._values:
             unknown: set[str] = set()
-            if _depends_on_place(socket, scope, unknown, set()):
+            if self._depends_on_place(socket, scope, unknown, set()):
                 for reason in sorted(unknown):
                     self.notices.append(f"{self.owner}: {reason} have no counterpart here; a middle value is used")
                 pixels = self._given(socket)
@@ -42,9 +42,41 @@ class SurfaceEvaluator(NodeEvaluator):
                     pixels = render_places(self._material, socket, scope, self._samples)
                     if socket.type == "VALUE":
                         pixels = np.ascontiguousarray(pixels[..., :1])
+                for name in sorted(self._samples.missing):
+                    self.notices.append(
+                        f"{self.owner}: some of its meshes have no attribute '{name}': black, as in Cycles"
+                    )
                 self._values[key] = Value(np.ones(1, np.float32), pixels, ATLAS)
         return super().output(socket, scope)
 
+    def _depends_on_place(self, socket, scope, unknown: set[str], seen: set) -> bool:
+        """Whether the output ``socket`` differs over a surface. Adds to ``unknown`` what nobody can tell.
+
+        Raises:
+            Unsupported: an image is missing, which Cycles would show in pink.
+        """
+        node = socket.node
+        depends = False
+        try:
+            depends = place_of(node, socket) is not None
+        except Unsupported as reason:
+            depends = True
+            unknown.add(str(reason))
+        depends |= node.bl_idname.startswith("ShaderNodeTex") and node.bl_idname != "ShaderNodeTexCoord"
+        if (node, scope) in seen:
+            return depends
+        seen.add((node, scope))
+        if node.bl_idname == "ShaderNodeTexImage":
+            if node.image is None:
+                raise Unsupported("no image is chosen")
+            if self.images.pixels(node.image, self.owner) is None:
+                raise Reported("its image is missing")
+        for item in node.inputs:
+            if item.enabled:
+                source, source_scope = resolve(item, scope)
+                if source.is_output:
+                    depends |= self._depends_on_place(source, source_scope, unknown, seen)
+        return depends
 
     def _given(self, socket: bpy.types.NodeSocket) -> np.ndarray | None:
         """(rows, columns, 1 or 3) of an output that hands out what the samples hold; None for all others."""
@@ -58,27 +90,6 @@ class SurfaceEvaluator(NodeEvaluator):
         if socket.type == "VALUE":
             values = values.mean(axis=1, keepdims=True)
         return values.reshape(*self._samples.atlas.shape, -1)
-
-
-def _depends_on_place(socket, scope, unknown: set[str], seen: set) -> bool:
-    """Whether the output ``socket`` differs over a surface. Adds to ``unknown`` what nobody can tell."""
-    node = socket.node
-    depends = False
-    try:
-        depends = place_of(node, socket) is not None
-    except Unsupported as reason:
-        depends = True
-        unknown.add(str(reason))
-    depends |= node.bl_idname.startswith("ShaderNodeTex") and node.bl_idname != "ShaderNodeTexCoord"
-    if (node, scope) in seen:
-        return depends
-    seen.add((node, scope))
-    for item in node.inputs:
-        if item.enabled:
-            source, source_scope = resolve(item, scope)
-            if source.is_output:
-                depends |= _depends_on_place(source, source_scope, unknown, seen)
-    return depends
 
 
 @dataclass(frozen=True)

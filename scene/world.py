@@ -16,7 +16,8 @@ from .cycles_reference import panoramic_camera, unbiased_settings
 from .images import ImageTable
 from .node_links import Unsupported, active_output, find_socket, resolve
 from .notices import Notices
-from .shader_nodes import DIFFUSE_RAY, NodeEvaluator
+from .ray_nodes import DIFFUSE_RAY
+from .shader_nodes import NodeEvaluator
 from .temporary import leave_nothing_behind, new_camera, plain_render_settings, render_pixels
 from .texture_coordinates import affine_coordinates
 

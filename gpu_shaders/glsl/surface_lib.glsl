@@ -2,7 +2,7 @@
  *
  * Layouts are written by scene_textures.py:
  *   triangle_attributes, 5 elements a triangle: normals and (material, object, texture scale) in w; uv0 uv1;
- *     uv2 and the density with which the triangle is sampled as an emitter (core/emitters.py)
+ *     uv2, the density with which the triangle is sampled as an emitter (core/emitters.py), its number in the snapshot
  *   materials, 3 elements: diffuse albedo, base image | emission, emission image | alpha, threshold, alpha image, alpha from colour
  *   image_table, 1 element: first row in image_texels, width, height, extension
  *   image_texels: linear RGBA, mip levels of an image one after the other
@@ -65,6 +65,17 @@ vec2 triangle_uv(int triangle, vec2 barycentric)
 #endif
 
 #ifdef HAS_ALPHA
+/* Threshold of partial transparency: core/dithering.py. */
+float dither_threshold(int triangle, vec2 barycentric)
+{
+  uvec2 cell = uvec2(clamp(barycentric, 0.0, 1.0) * 256.0);
+  uint mixed = uint(element(triangle_attributes, 5 * triangle + 4).w) * 0x9E3779B1u ^ cell.x * 0x85EBCA6Bu ^ cell.y * 0xC2B2AE35u;
+  mixed = (mixed ^ (mixed >> 16u)) * 0x7FEB352Du;
+  mixed = (mixed ^ (mixed >> 15u)) * 0x846CA68Bu;
+  mixed ^= mixed >> 16u;
+  return (float(mixed >> 8u) + 0.5) / 16777216.0;
+}
+
 /* Is the material clipped away here? Sampled at full resolution: a mip would thin out leaves. */
 bool is_hole(int triangle, vec2 barycentric)
 {
@@ -77,7 +88,7 @@ bool is_hole(int triangle, vec2 barycentric)
     alpha *= clip.w != 0.0 ? dot(texel.rgb, vec3(1.0 / 3.0)) : texel.a;
   }
 #endif
-  return alpha < clip.y;
+  return alpha < (clip.y > 1.0 ? dither_threshold(triangle, barycentric) : clip.y);
 }
 #endif
 
