@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Nodes whose value depends on the ray that asks: answered for the diffuse rays of a bake, averaged over directions with
-the cosine."""
+"""Nodes whose value depends on the ray that asks: answered for the diffuse rays of a bake, averaged over directions
+with the cosine."""
 
 from __future__ import annotations
 

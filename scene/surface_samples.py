@@ -55,8 +55,8 @@ class SurfaceSamples:
 
     def array(self, name: str) -> np.ndarray:
         """(P, 1 or 3) float32. Names: ``position``, ``normal``, ``object``, ``generated``, ``object normal``;
-        ``uv NAME``;        ``attribute NAME`` and ``alpha NAME``, where no name means the render colour; ``info WHAT`` with a field of
-        InstanceFacts or ``alpha``; ``property NAME`` of the object.
+        ``uv NAME``; ``attribute NAME`` and ``alpha NAME``, where no name means the render colour; ``info WHAT`` with a
+        field of InstanceFacts or ``alpha``; ``property NAME`` of the object.
 
         Raises:
             Unsupported: not all meshes of the material can answer.

@@ -7,7 +7,7 @@ import numpy as np
 from gridlight.bake.job import run_bake
 from gridlight.core import lookup
 from gridlight.core.sampling import tangent_frame
-from gridlight.core.snapshot import Image, Light, Material, SceneSnapshot, World
+from gridlight.core.snapshot import DITHERED, Image, Light, Material, SceneSnapshot, World
 
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
 
@@ -158,7 +158,7 @@ def cluttered_room(lights=None, seed=0, clutter=24):
         Material("glowing", (0.3, 0.3, 0.3), emission=(0.5, 0.8, 1.0)),
         Material("glowing picture", (0.5, 0.5, 0.5), diffuse_share=0.5, emission=(1.0, 0.5, 0.2), emission_image=0),
         Material("leaf", (0.2, 0.8, 0.3), alpha_image=1, alpha_threshold=0.5),
-        Material("net", (0.6, 0.1, 0.1), base_image=0, alpha_image=0, alpha_from_color=True, alpha_threshold=0.4),
+        Material("net", (0.6, 0.1, 0.1), base_image=0, alpha_image=0, alpha_from_color=True, alpha_threshold=DITHERED),
     ]
     images = [Image("noise", pixels, "REPEAT"), Image("holes", holes, "EXTEND")]
     sky = generator.random((16, 32, 3)).astype(np.float32)
