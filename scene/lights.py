@@ -17,6 +17,8 @@ from .notices import Notices
 from .shader_nodes import NodeEvaluator
 from .surface_shaders import evaluate_shader
 
+_FEW_BOUNCES = 12  # fewer can be told from light that bounces until it is gone
+
 ROLE_PROPERTY, GROUP_PROPERTY, INTENSITY_PROPERTY = "gridlight_role", "gridlight_group", "gridlight_intensity"
 
 
@@ -78,6 +80,8 @@ def _read_light(item, matrix, name, node_tint, notices) -> Light | None:
     }
     kind = _KINDS[data.type](data, scale)
     values["color"] = tuple(float(value) for value in color * kind.pop("unit"))
+    if data.cycles.max_bounces < _FEW_BOUNCES:
+        notices.group("lights whose bounces are limited bounce on here", name)
     if _linked(item):
         notices.append(f"light '{name}' uses light linking: it lights every object here")
     return Light(**values, **kind)

@@ -121,7 +121,8 @@ def _read(scene, view_layer, evaluate, world: World | None = None) -> SceneSnaps
     )
     images = ImageTable(notices)
     surfaces = SurfaceParts()
-    materials = MaterialTable(images, notices, surfaces)
+    # Inside a render engine's callback Cycles cannot be asked, and so no atlas be filled.
+    materials = MaterialTable(images, notices, surfaces if world is None else None)
     override = view_layer.material_override
     for group in harvest.groups.values():
         group.materials = [override] if override else group.materials or [None]
