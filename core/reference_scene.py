@@ -59,9 +59,8 @@ class ReferenceScene:
             if material.alpha_image != NO_IMAGE and len(here):
                 texel = self._image(material.alpha_image, triangle[here], barycentric[here])
                 alpha *= texel[:, :3].mean(axis=1) if material.alpha_from_color else texel[:, 3]
-            threshold = material.alpha_threshold
-            if threshold >= DITHERED:
-                threshold = dither_threshold(triangle[here], barycentric[here])
+            dithered = material.alpha_threshold >= DITHERED
+            threshold = dither_threshold(triangle[here], barycentric[here]) if dithered else material.alpha_threshold
             hole[here] = alpha < threshold
         return hole
 

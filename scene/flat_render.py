@@ -25,14 +25,18 @@ def render_socket(
     with leave_nothing_behind():
         copy = material.copy()
         output = exposed_in_groups(copy.node_tree, socket, scope)
-        tree = copy.node_tree
-        emission, target = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeOutputMaterial")
-        tree.links.new(output, emission.inputs["Color"])
-        tree.links.new(emission.outputs[0], target.inputs["Surface"])
-        for node in tree.nodes:
-            if node.bl_idname == "ShaderNodeOutputMaterial" and node != target:
-                tree.nodes.remove(node)
+        show_alone(copy.node_tree, output)
         return _render(copy, edge, uv_map or "UVMap")
+
+
+def show_alone(tree: bpy.types.NodeTree, output: bpy.types.NodeSocket) -> None:
+    """Make the material ``tree`` emit what ``output`` carries, and nothing else."""
+    emission, target = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(output, emission.inputs["Color"])
+    tree.links.new(emission.outputs[0], target.inputs["Surface"])
+    for node in tree.nodes:
+        if node.bl_idname == "ShaderNodeOutputMaterial" and node != target:
+            tree.nodes.remove(node)
 
 
 def exposed_in_groups(

@@ -13,7 +13,7 @@ import numpy as np
 
 from .albedos import fresnel_mean
 from .cycles_reference import unbiased_settings
-from .flat_render import exposed_in_groups
+from .flat_render import exposed_in_groups, show_alone
 from .node_links import Scope, Unsupported
 from .ray_nodes import DIFFUSE_RAY, layer_weight_mean
 from .surface_samples import SurfaceSamples
@@ -35,13 +35,7 @@ def render_places(
     with leave_nothing_behind():
         copy = material.copy()
         tree = copy.node_tree
-        output = exposed_in_groups(tree, socket, scope)
-        emission, target = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeOutputMaterial")
-        tree.links.new(output, emission.inputs["Color"])
-        tree.links.new(emission.outputs[0], target.inputs["Surface"])
-        for node in tree.nodes:
-            if node.bl_idname == "ShaderNodeOutputMaterial" and node != target:
-                tree.nodes.remove(node)
+        show_alone(tree, exposed_in_groups(tree, socket, scope))
         wanted: set[str] = set()
         _replace_places(tree, wanted)
         arrays = {name: samples.array(name) for name in sorted(wanted)}

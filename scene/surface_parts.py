@@ -26,7 +26,7 @@ class SurfaceParts:
         """The atlas of all surface that shows ``material``; None where that has too many triangles."""
         key = material.as_pointer()
         if key not in self._samples:
-            parts = []
+            parts: list[Part] = []
             for group, slots in self._groups:
                 shows = np.array([slot == material for slot in slots] or [False])
                 chosen = shows[np.clip(group.mesh.slots, 0, len(shows) - 1)]
