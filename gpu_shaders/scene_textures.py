@@ -79,8 +79,10 @@ class SceneTextures:
         """
         hierarchy = "kept" if changes.shape is None else self._reshape(snapshot, changes.shape)
         if hierarchy == "rebuilt" or changes.materials or changes.emission or changes.reflectance:
+            assert emitter_density is not None
             self._send_surfaces(snapshot, emitter_density)
         elif changes.shape:
+            assert emitter_density is not None
             order = self.hierarchy.order
             differs = changes.shape.where[order] | (emitter_density[order] != self._density)
             self._send_surfaces(snapshot, emitter_density, np.flatnonzero(differs))

@@ -33,10 +33,10 @@ def test_links_lead_somewhere(page):
             assert anchor in anchors(path.read_text(encoding="utf-8")), f"{page.name} links to {target}"
 
 
-def options_of(command: str) -> set[str]:
+def options_of(package: str, command: str) -> set[str]:
     from gridlight.cli.arguments import Parser
 
-    module = importlib.import_module(f"gridlight.cli.{command}")
+    module = importlib.import_module(f"{package}.{command}")
     parser = Parser(prog="gridlight")
     module.add_arguments(parser, in_blender=False)
     return {option for action in parser._actions for option in action.option_strings} | {"--verbose"}
@@ -44,14 +44,19 @@ def options_of(command: str) -> set[str]:
 
 @pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
 def test_commands_and_options_exist(page):
-    from gridlight.cli.main import COMMANDS
+    from gridlight.cli.main import GRIDLIGHT
+    from gridlight.farm.commands import FAMILY as FARM
 
-    for command, words in re.findall(r"(?:\./gridlight|--command gridlight) ([a-z]+)\b([^`|\n]*)", page.read_text()):
-        assert command in COMMANDS, f"{page.name}: gridlight {command}"
+    line = re.compile(r"(?:\./gridlight|--command gridlight) (?:(farm) )?([a-z]+)\b([^`|\n]*)")
+    for farm, command, words in line.findall(page.read_text()):
+        if command == "farm":
+            continue
+        family = FARM if farm else GRIDLIGHT
+        assert command in family.names, f"{page.name}: {family.program} {command}"
         if command != "bench":  # its parts have options of their own
-            known = options_of(command)
+            known = options_of(family.package, command)
             for option in re.findall(r"(?<!\S)(--[a-z-]+)", words):
-                assert option in known, f"{page.name}: gridlight {command} {option}"
+                assert option in known, f"{page.name}: {family.program} {command} {option}"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
