@@ -28,6 +28,8 @@ from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..core.steps import Pace, Steps
 from ..gpu_shaders.probe_paths import ProbePaths
+from ..gpu_shaders.scene_textures import SceneTextures
+from .block_session import AnySession, open_session
 from .deringing import dering_field
 from .passes import Passes
 from .result import BakeResult, Reporter
@@ -90,6 +92,7 @@ class ErrorDrivenBake:
         self._spent = 0.0
         self._between: SquaredError | None = None
         self.whole: Field | None = None
+        self._scene: SceneTextures | None = None
 
     # The whole
     # ------------------------------------------------------------------------------------------------------------------
@@ -100,10 +103,9 @@ class ErrorDrivenBake:
         Raises:
             InputError: as BakeSession.bake does.
         """
-        self.session = BakeSession(
-            self.snapshot, self.grid, self._settings, self._reporter, self._edits, self.result, pace=self._pace
-        )
+        self.session: AnySession = self._open(self._settings, self._edits, self.result)
         yield from self.session.bake()
+        self._scene = self.result.scene
         field = self._field = _baked(self.result)
         self._took(self._level, int((field.state == ACTIVE).sum()))
         self._active = np.flatnonzero(field.state == ACTIVE)
@@ -114,12 +116,19 @@ class ErrorDrivenBake:
             return
         yield from self._find_level()
 
+    def _open(self, settings: BakeSettings, edits: ProbeEdits, result: BakeResult | None = None) -> AnySession:
+        """A session that uses the scene on the GPU, or one of several blocks, which sends it itself."""
+        what = self.snapshot, self.grid, settings, self._reporter, edits, result
+        if self.grid.count > settings.block:
+            return open_session(*what, pace=self._pace)
+        return BakeSession(*what, pace=self._pace, scene=self._scene)
+
     def _find_level(self) -> Steps[None]:
         """Checks and refines until the target is met or nothing helps."""
         random = np.random.default_rng(self._settings.seed)
         self._checked = np.sort(random.permutation(self._active)[:_CHECKED])
         positions = (self.grid.positions() + self._field.offset)[self._checked]
-        self._paths = ProbePaths(self.session.backend.scene, self.snapshot, self.grid, positions)
+        self._paths = self._paths_from(positions)
         self._check = PathCheck(len(self._checked))
         self._model = ErrorModel()
         why = ""
@@ -182,6 +191,11 @@ class ErrorDrivenBake:
                     return
             yield from self._add_paths(self._paths, self._check, max(self._check.paths, _FIRST_PATHS))
 
+    def _paths_from(self, places: np.ndarray) -> ProbePaths:
+        """Paths from ``places`` (K, 3), world metres."""
+        assert self._scene is not None  # it is there after the first pass
+        return ProbePaths(self._scene, self.snapshot, self.grid, places)
+
     def _add_paths(self, paths: ProbePaths, check: PathCheck, count: int) -> Steps[np.ndarray]:
         """Follows ``count`` more; returns (K,) the share of them that first meet a surface from behind."""
         behind = np.zeros(paths.count)
@@ -214,19 +228,12 @@ class ErrorDrivenBake:
         )
         chosen = self._who_needs_it(self._model.predicted(level) / self._model.predicted(before), wanted)
         everyone = len(chosen) == len(self._active)
-        if everyone and same_face and self.session.settings.face == level.face:
-            steps = self.session.light_with(settings)
-            session = self.session
+        session: AnySession
+        kept = self.session
+        if everyone and isinstance(kept, BakeSession) and kept.settings.face == level.face:
+            session, steps = kept, kept.light_with(settings)
         else:
-            session = BakeSession(
-                self.snapshot,
-                self.grid,
-                settings,
-                self._reporter,
-                self._only(chosen),
-                pace=self._pace,
-                scene=self.session.backend.scene,
-            )
+            session = self._open(settings, self._only(chosen))
             steps = session.bake()
         yield from steps
         for phase, seconds in session.result.seconds.items():
@@ -263,12 +270,12 @@ class ErrorDrivenBake:
         """The error at random free places of the volume, which the target does not cover."""
         local = random.uniform(-1, 1, (4 * _BETWEEN, 3))
         points = local @ self.grid.matrix[:3, :3].T + self.grid.matrix[:3, 3]
-        paths = ProbePaths(self.session.backend.scene, self.snapshot, self.grid, points)
+        paths = self._paths_from(points)
         behind = yield from self._add_paths(paths, PathCheck(len(points)), 16)
         points = points[behind <= _BEHIND][:_BETWEEN]
         if len(points):
             check = PathCheck(len(points))
-            paths = ProbePaths(self.session.backend.scene, self.snapshot, self.grid, points)
+            paths = self._paths_from(points)
             yield from self._add_paths(paths, check, _FIRST_PATHS)
             if check.scale:
                 self._between = check.error(_read(self._light.field, points))
