@@ -12,6 +12,7 @@ import numpy as np
 
 from ..core.snapshot import Light
 from .images import ImageTable
+from .light_flux import known_tint, measured_tint
 from .node_links import active_output, find_socket
 from .notices import Notices
 from .shader_nodes import NodeEvaluator
@@ -25,7 +26,9 @@ ROLE_PROPERTY, GROUP_PROPERTY, INTENSITY_PROPERTY = "gridlight_role", "gridlight
 class LightTable:
     """Collects lights; every instance of a light object is a light of its own."""
 
-    def __init__(self, images: ImageTable, notices: Notices):
+    def __init__(self, images: ImageTable, notices: Notices, measures: bool = True):
+        """``measures``: nodes without a counterpart may be rendered; else what was last found of them is used."""
+        self._measures = measures
         self.lights: list[Light] = []
         self._images = images
         self._notices = notices
@@ -47,8 +50,15 @@ class LightTable:
         output = active_output(data.node_tree, "ShaderNodeOutputLight")
         if output is None:
             return np.zeros(3)
-        evaluator = NodeEvaluator(f"light '{data.name}'", self._images, self._notices, data.name)
+        notices = Notices()
+        evaluator = NodeEvaluator(f"light '{data.name}'", self._images, notices, data.name)
         emission = evaluate_shader(evaluator, find_socket(output.inputs, "Surface")).emission
+        if data.type != "SUN" and (evaluator.loses_pattern or not emission.is_constant):
+            tint = measured_tint(data) if self._measures else known_tint(data)
+            if tint is not None:
+                self._notices.group("light that differs with direction or distance enters with its mean", data.name)
+                return tint
+        self._notices.extend(notices)
         if not emission.is_constant:
             self._notices.append(f"light '{data.name}': the texture on it is not supported; its mean colour is used")
         return emission.rgb()

@@ -106,7 +106,7 @@ def read_lights(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list
         view_layer,
         lambda depsgraph: _harvest(depsgraph, rendered_objects(view_layer), rigid_bodies, notices, meshes=False),
     )
-    lights = LightTable(ImageTable(notices), notices)
+    lights = LightTable(ImageTable(notices), notices, measures=False)
     for item, matrix, name in harvest.lights:
         lights.add(item, matrix, name)
     return lights.lights
@@ -134,7 +134,7 @@ def _read(scene, view_layer, evaluate, world: World | None = None) -> SceneSnaps
         object_names += group.names
         if part is not None:
             parts.append(part)
-    lights = LightTable(images, notices)
+    lights = LightTable(images, notices, measures=world is None)
     for item, matrix, name in harvest.lights:
         lights.add(item, matrix, name)
     return SceneSnapshot(

@@ -138,3 +138,22 @@ def test_roles(scene):
 def test_no_shadow(scene):
     lamp("SUN", use_shadow=False)
     assert read_scene(scene).lights[0].casts_shadow is False
+
+
+@pytest.mark.parametrize("kind", ["POINT", "SPOT"])
+def test_nodes_that_differ_with_direction_enter_with_their_mean(scene, kind):
+    """Half of the directions are dark, to one side of the lamp, so half of its light is left."""
+    light = lamp(kind, energy=40.0, shadow_soft_size=0.0)
+    light.rotation_euler = (0.2, 0.1, 0.4)
+    tree = with_nodes(light.data)
+    direction = node(tree, "ShaderNodeTexCoord").outputs["Normal"]
+    side = node(tree, "ShaderNodeSeparateXYZ", {"Vector": direction}).outputs["X"]
+    lit = node(tree, "ShaderNodeMath", {"Value": side, "Value_001": 0.0}, operation="GREATER_THAN").outputs[0]
+    glow = node(tree, "ShaderNodeEmission", {"Color": (1, 0.5, 0.25, 1), "Strength": lit})
+    node(tree, "ShaderNodeOutputLight", {"Surface": glow.outputs[0]})
+    blocks = len(bpy.data.scenes), len(bpy.data.lights), len(bpy.data.meshes)
+    snapshot = read_scene(scene)
+    expected = np.array([1, 0.5, 0.25]) * 40 / (4 * math.pi) / 2
+    assert snapshot.lights[0].color == pytest.approx(expected, rel=0.03)
+    assert any("differs with direction" in line and "'lamp'" in line for line in snapshot.warnings)
+    assert blocks == (len(bpy.data.scenes), len(bpy.data.lights), len(bpy.data.meshes))
