@@ -144,6 +144,7 @@ def _relocate(
             step[slots] = relocation.moves(grid, placement.home[slots], found)
         yield
     settled = (~placement.misplaced | placement.moved) & ~placement.by_hand
+    settled &= placement.moved | (placement.shares[:, 3] > 0)  # others are behind nothing and were kept clear before
 
     def keep_clear() -> np.ndarray:
         at = (placement.home + step)[settled]
