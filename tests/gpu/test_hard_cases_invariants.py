@@ -20,7 +20,7 @@ from small_scenes import AXES, bake, irradiance_at_nodes, moved
 
 SETTINGS = BakeSettings(face=4, bounces=3, capture="trace")
 PIECES, SCENES_EACH = 20, 25
-MOST_TURNED, USUALLY_TURNED = 0.7, 0.1  # share of the light that a quarter turn changes: in one scene, the median
+MOST_TURNED, USUALLY_TURNED = 0.3, 0.1  # share of the light that a quarter turn changes: in one scene, the median
 # Seeds are given: the scenes of a run are always the same ones, so a failure can be met again anywhere.
 some = settings(deadline=None, suppress_health_check=list(HealthCheck), database=None, phases=[Phase.generate])
 
@@ -107,15 +107,18 @@ def check_turn(spec):
     snapshot = replace(snapshot, lights=points, materials=matt)
     turn = np.eye(4)[[1, 2, 0, 3] if spec.seed % 2 else [1, 0, 2, 3]]
     turn[:3, 1] *= np.linalg.det(turn)
-    choice = replace(SETTINGS, face=6)
-    straight = bake(snapshot, grid, choice).field
-    turned = bake(moved(snapshot, turn), Grid(turn @ grid.matrix, grid.resolution), choice).field
-    if straight.offset.any() or turned.offset.any():
-        return None  # which of two ways out of a wall is the shorter one may be up to rounding
-    np.testing.assert_array_equal(turned.state, straight.state)
-    expected = irradiance_at_nodes(straight)
-    found = irradiance_at_nodes(turned, AXES @ turn[:3, :3].T)
-    error = float(np.sqrt(((found - expected) ** 2).sum() / max((expected**2).sum(), 1e-30)))
+    for face in (6, 32):
+        choice = replace(SETTINGS, face=face)
+        straight = bake(snapshot, grid, choice).field
+        turned = bake(moved(snapshot, turn), Grid(turn @ grid.matrix, grid.resolution), choice).field
+        if straight.offset.any() or turned.offset.any():
+            return None  # which of two ways out of a wall is the shorter one may be up to rounding
+        np.testing.assert_array_equal(turned.state, straight.state)
+        expected = irradiance_at_nodes(straight)
+        found = irradiance_at_nodes(turned, AXES @ turn[:3, :3].T)
+        error = float(np.sqrt(((found - expected) ** 2).sum() / max((expected**2).sum(), 1e-30)))
+        if error <= MOST_TURNED:
+            break  # else a narrow spot, say, is smaller than a texel: finer ones have to find it either way
     assert error <= MOST_TURNED
     return error
 
