@@ -17,6 +17,18 @@ from .snapshot import NO_IMAGE, Image, Light, Material, SceneSnapshot, World
 from .triangles import bounds
 
 MOST_BOXES = 32  # around what changed, on each side; more follow the shape closer and cost more per texel
+# What surfaces are: where it is the very same data, nothing of it need be compared.
+_SURFACES = (
+    "vertices",
+    "triangles",
+    "corner_normals",
+    "corner_uvs",
+    "material_index",
+    "object_index",
+    "object_names",
+    "materials",
+    "images",
+)
 _LIGHT_LABELS = {"name", "group", "dynamic"}  # say nothing about the light itself
 _LIGHT_SHADES = {"color", "spot_blend"}  # where these differ, shadows stay what they are
 
@@ -97,6 +109,18 @@ def compare(old: SceneSnapshot, new: SceneSnapshot) -> SceneChanges:
     lights = np.array(
         [i >= len(old.lights) or _differs(old.lights[i], light) for i, light in enumerate(new.lights)], bool
     )
+    if all(getattr(old, name) is getattr(new, name) for name in _SURFACES):  # a lamp that moves in a large scene
+        return SceneChanges(
+            lights=lights,
+            lights_removed=max(len(old.lights) - len(new.lights), 0),
+            lights_moved=tuple(_moved_lights(old.lights, new.lights, lights)),
+            world=_differs(old.world, new.world),
+            emission=False,
+            reflectance=False,
+            materials=False,
+            images=False,
+            shape=None,
+        )
     triangle_map = _match_triangles(old, new)
     common = _common_triangles(triangle_map, len(new.triangles))
     images = _image_map(old.images, new.images)

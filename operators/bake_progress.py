@@ -12,7 +12,7 @@ _SHARES = {"read": 0.05, "cull": 0.05, "upload": 0.1, "capture": 0.3, "light": 0
 _TITLES = {
     "read": "Reading the scene",
     "cull": "Culling probes",
-    "upload": "Sending the scene to the GPU",
+    "upload": "Sending the scene",
     "capture": "Capturing",
     "light": "Bouncing light",
     "project": "Collecting light",
@@ -86,15 +86,24 @@ class Progress:
             return None
         return elapsed * (1.0 - self.share) / self.share
 
-    def __str__(self) -> str:
+    @property
+    def what(self) -> str:
+        """What is being done, short enough for a narrow sidebar."""
         text = _TITLES.get(self._phase, self._phase.capitalize())
-        if self._volumes > 1 and self.name:
-            text = f"{self.name}: {text}"
         if self._total:
             text += f" {min(self._done, self._total)}/{self._total}"
         elif self._done:
             text += f" {self._done}"
-        left = self.seconds_left
-        if left is not None:
-            text += f", {left:.0f} s left" if left < 90 else f", {left / 60:.0f} min left"
         return text
+
+    @property
+    def which(self) -> str:
+        """The volume where there are several, and the time that is left where it can be guessed."""
+        left = self.seconds_left
+        parts = [self.name] if self._volumes > 1 and self.name else []
+        if left is not None:
+            parts.append(f"{left:.0f} s left" if left < 90 else f"{left / 60:.0f} min left")
+        return ", ".join(parts)
+
+    def __str__(self) -> str:
+        return ", ".join(part for part in (self.what, self.which) if part)

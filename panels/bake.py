@@ -28,9 +28,12 @@ class GRIDLIGHT_PT_bake(SidebarPanel, bpy.types.Panel):
         target = row.row(align=True)
         target.active = settings.use_error
         target.prop(settings, "target_error")
+        task = running_task()
         row = layout.row()
         row.active = False
-        if settings.use_error:
+        if task is not None:
+            row.label(text=task.progress.which or "Esc cancels and leaves everything as it was")
+        elif settings.use_error:
             row.label(text="Settings are chosen for this error")
         elif quality:
             row.label(text=f"{quality.error_percent:.1f} % from path tracing in the gallery")
@@ -38,7 +41,6 @@ class GRIDLIGHT_PT_bake(SidebarPanel, bpy.types.Panel):
             row.label(text="Error not measured in advance")
         row = layout.row(align=True)
         row.scale_y = 1.5
-        task = running_task()
         if task is not None:
             _running(row, task)
         else:
@@ -55,8 +57,10 @@ class GRIDLIGHT_PT_bake_settings(SidebarPanel, bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.enabled = running_task() is None
         settings = context.scene.gridlight
+        if running_task() is not None:
+            paragraph(layout, context, "A bake is running with these; they can be changed when it is done", "INFO")
+            layout.enabled = False
         column = layout.column()
         column.prop(settings, "bands")
         column.prop(settings, "face")
@@ -86,7 +90,7 @@ def _buttons(row, context) -> None:
 def _running(row, task) -> None:
     """In place of the buttons, and as high as they are: nothing below moves."""
     split = row.split(factor=0.75, align=True)
-    split.progress(factor=task.progress.share, text=str(task.progress))
+    split.progress(factor=task.progress.share, text=task.progress.what)
     split.operator(names.CANCEL_BAKE)
 
 

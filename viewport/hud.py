@@ -8,6 +8,7 @@ import bpy
 import gpu
 from gpu_extras.batch import batch_for_shader
 
+from ..core.conventions import CULLED, INVALID
 from .sessions import SceneSession
 
 _SIZE, _LEADING, _MARGIN = 12, 1.5, 16
@@ -22,6 +23,11 @@ _STATES = [
     ((0.8, 0.08, 0.1), "invalid: in a solid"),
     ((0.25, 0.35, 0.65), "culled: lights nothing"),
 ]
+# Spheres of probes that have no light of their own, as viewport_data_lib.glsl draws them.
+_MARKS = [
+    (CULLED, (0.25, 0.25, 0.25), "probe is culled: lights nothing"),
+    (INVALID, (0.66, 0.15, 0.15), "probe is invalid: in a solid"),
+]
 
 
 def draw(context: bpy.types.Context, session: SceneSession, preview) -> None:
@@ -34,7 +40,9 @@ def draw(context: bpy.types.Context, session: SceneSession, preview) -> None:
     if preview.mode == "ERROR":
         _heat_legend(left, bottom + 5 * line, scale)
     elif preview.mode == "VALIDITY":
-        _state_legend(left, bottom + 4 * line, line, scale)
+        _legend(_STATES, left, bottom + 4 * line, line, scale)
+    elif preview.show_probes:
+        _legend(_marks(session), left, bottom + 4 * line, line, scale)
 
 
 def lines(context: bpy.types.Context, session: SceneSession, preview) -> list[str]:
@@ -101,8 +109,20 @@ def _heat_legend(left: float, bottom: float, scale: float) -> None:
     write(f"{HEAT_END_PERCENT} % and more", left + 0.75 * width, bottom - 1.5 * height, scale)
 
 
-def _state_legend(left: float, bottom: float, line: float, scale: float) -> None:
-    for row, (color, meaning) in enumerate(reversed(_STATES)):
+def _marks(session: SceneSession) -> list[tuple[tuple[float, float, float], str]]:
+    """Colours of spheres of probes without light of their own, where there are such."""
+    fields = session.gpu.fields.values() if session.gpu else []
+    return [
+        (color, meaning)
+        for state, color, meaning in _MARKS
+        if any((item.field.state == state).any() for item in fields)
+    ]
+
+
+def _legend(
+    entries: list[tuple[tuple[float, float, float], str]], left: float, bottom: float, line: float, scale
+) -> None:
+    for row, (color, meaning) in enumerate(reversed(entries)):
         y = bottom + row * line
         rectangle(left, y, left + 10 * scale, y + 10 * scale, (*color, 1))
         write(meaning, left + 18 * scale, y, scale)

@@ -315,3 +315,14 @@ def test_any_set_of_changes_is_told_apart():
         for name in chosen:
             new = makers[name](new)
         assert flags(compare(scene(), new)) == chosen
+
+
+def test_shared_surfaces_are_no_change_and_lights_are_told_alike():
+    """What follows lamps hands the same arrays on: the answer is that of equal ones, without looking at them."""
+    before = scene()
+    lights = [before.lights[0], replace(before.lights[1], color=(2.0, 1.0, 1.0))]
+    after = replace(before, lights=lights, world=World((0.5, 0.5, 0.5)))
+    shared, read_again = compare(before, after), compare(before, copied(after))
+    assert shared.describe() == read_again.describe() and flags(shared) == flags(read_again) == {"lights", "world"}
+    assert shared.lights.tolist() == read_again.lights.tolist() and shared.lights_removed == 1
+    assert compare(before, replace(before)).nothing
