@@ -266,7 +266,18 @@ class User:
         yield 0.05
 
 
-HOLDS_GPU_MEMORY = {"GpuBackend", "SceneTextures", "Surfaces", "Batches", "BakeSession", "GpuScene", "SceneSession"}
+HOLDS_GPU_MEMORY = {
+    "GpuBackend",
+    "SceneTextures",
+    "Surfaces",
+    "Batches",
+    "BakeSession",
+    "PatchLight",
+    "GpuScene",
+    "SceneSession",
+    "FieldTextures",
+    "LiveField",
+}
 
 
 def is_users(item):
