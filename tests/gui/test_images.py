@@ -27,13 +27,12 @@ def build(person):
     field = person.module("core.field").Field.empty(grid, 3)
     x, y, z = (grid.positions() / 2.5).T
     warm = np.stack([0.5 + 0.4 * x, 0.4 + 0.1 * x * y, 0.35 - 0.25 * x], axis=1)
-    warm *= 1 + np.exp(-((x - 1) ** 2) - 2 * (y - 1) ** 2 - (z + 1) ** 2)[:, None]  # a bright corner: the heat map's
     field.coefficients[:, 0] = warm * np.sqrt(4 * np.pi)
-    field.coefficients[:, 2] = 0.9 * warm * (1 + 0.5 * z)[:, None]
+    field.coefficients[:, 2] = 0.4 * warm * (1 + 0.5 * z)[:, None]
     field.depth[:] = 100.0, 10000.0
     field.validity[:] = 0.6 + 0.4 * z
     conventions = person.module("core.conventions")
-    field.state[12], field.state[13] = conventions.CULLED, conventions.INVALID
+    field.state[4], field.state[22] = conventions.CULLED, conventions.INVALID
     person.module("scene.field_storage").store_field(volume, field, "known light")
     person.module("viewport").field_changed(volume)
     space = lit_room.view(person, distance=3.4, rotation=(0.78, 0.52, 0.19, 0.28))
