@@ -16,7 +16,8 @@ def plain(gpu_context):
     return light_at(bake_room(), points())
 
 
-def check(plain, tolerance=2e-3, **options):
+def check(plain, tolerance=4e-3, **options):
+    # A texel on an edge that rounds elsewhere may lead another patch: then its points, and their noise, are others.
     result = bake_room(**options)
     check_whole(result)
     assert result.counts["active"] == result.counts["total"]
@@ -54,12 +55,11 @@ def test_slabs_that_run_into_each_other(plain):
 
 @pytest.mark.parametrize("share", [1.0, 0.5], ids=["all", "half of them"])
 def test_flipped_normals(plain, share):
-    """The reader's arrays for a mesh whose faces look the wrong way. Other barycentrics round hits elsewhere in the
-    last digit, and a few rays between patches end on other ones."""
+    """The reader's arrays for a mesh whose faces look the wrong way."""
     corners = walls()
     flipped = np.random.default_rng(3).random(len(corners)) < share
     corners[flipped] = corners[flipped][:, ::-1]
-    check(plain, corners=corners, tolerance=4e-3)
+    check(plain, corners=corners)
 
 
 def test_shading_normals_that_lie(plain):
