@@ -83,6 +83,7 @@ class BakeSession(VolumeBake):
     def _light_again(self, changes: SceneChanges, had_emitters: bool, live: bool) -> Steps[bool]:
         """Light for patches that stay; returns whether they could."""
         light, relit = self.backend.light, self.result.relit
+        assert relit is not None
         before = light.source()
         emitters = changes.emission and (had_emitters or self.backend.scene.emitter_count > 0)
         lamps = self._changed_lamps(changes)
@@ -116,6 +117,7 @@ class BakeSession(VolumeBake):
     def _light_anew(self) -> Steps[None]:
         """Light from texel surfaces on; probes that had been moved capture at home first, where placement begins."""
         relit = self.result.relit
+        assert relit is not None
         yield from self._go_home()
         verdict = yield from self.see()
         yield from self.settle(verdict)

@@ -87,7 +87,7 @@ class PatchDirect:
             light = self._parts[part] = _PartLight()
             light.grow(0, self.count)
             self.find_spread(part, points, 0, self.count, light.spread.texture)
-            lamps += 0 if part == EMITTERS else part[1] - part[0]
+            lamps += part[1] - part[0] if isinstance(part, tuple) else 0
             yield
         yield from self._light_what_is_due(points)
         return lamps
@@ -120,8 +120,8 @@ class PatchDirect:
                 reduce_patches(light.spread.texture, first, stop, sums, row * len(parts) + column)
         table = read(sums, len(parts) * len(ranges), channels=1).reshape(len(ranges), len(parts)).astype(float)
         target = self._mean_lights.reserve(self.count)
-        for (first, stop), row in zip(ranges, table):
-            fill_elements(target, first, stop - first, float(row.sum()) / max(stop - first, 1))
+        for (first, stop), means in zip(ranges, table):
+            fill_elements(target, first, stop - first, float(means.sum()) / max(stop - first, 1))
 
     def _list_due(self, light: _PartLight, index: int, counts: gpu.types.GPUTexture, row: int) -> gpu.types.GPUTexture:
         """Patches that ``light`` should light with SAMPLES[index] and has not yet, marked as lit so; their number goes
@@ -172,7 +172,7 @@ class PatchDirect:
         """Direct light by ``part`` of ``count`` patches or texels, whose numbers are in ``chosen``, with
         ``points_each`` places in ``points``, into ``target``; in steps."""
         for begins, portion in enumerate(self._portions(part)):
-            lamps = 1 if portion == EMITTERS else portion[1] - portion[0]
+            lamps = portion[1] - portion[0] if isinstance(portion, tuple) else 1
             samples_each = max(1, _SAMPLES_EACH // lamps)
             at_once = max(1, _THREADS_AT_ONCE // -(-samples // samples_each))
 
@@ -188,7 +188,7 @@ class PatchDirect:
         """``part`` in portions small enough for one thread, see patch_direct_comp.glsl."""
         if part == EMITTERS:
             return [EMITTERS]
-        first, stop = (0, self._scene.lamp_count) if part == ALL else part
+        first, stop = part if isinstance(part, tuple) else (0, self._scene.lamp_count)
         portions: list[Part] = [(at, min(at + _LAMPS_AT_ONCE, stop)) for at in range(first, stop, _LAMPS_AT_ONCE)]
         return [*portions, EMITTERS] if part == ALL and self._scene.emitter_count else portions
 
@@ -242,7 +242,7 @@ class PatchDirect:
 
     def _bind(self, shader, part: Part) -> None:
         (self._scene.bind_lights if part == EMITTERS else self._scene.bind_lamps)(shader)
-        first, stop = (0, 0) if part == EMITTERS else part
+        first, stop = part if isinstance(part, tuple) else (0, 0)
         shader.uniform_int("first_light", (first,))
         shader.uniform_int("light_count", (stop,))
 
