@@ -33,6 +33,7 @@ load_package()
 
 from gridlight.bake.job import run_bake  # noqa: E402  (the package has just been loaded)
 from gridlight.bake.preview import standard_view  # noqa: E402
+from gridlight.bake.result import Silent  # noqa: E402
 from gridlight.core import camera, lookup, ringing  # noqa: E402
 from gridlight.core.field import Field  # noqa: E402
 from gridlight.core.grid import Grid  # noqa: E402
@@ -42,23 +43,6 @@ from gridlight.gpu_shaders.context import ensure_context  # noqa: E402
 from gridlight.gpu_shaders.preview_pass import PreviewPass  # noqa: E402
 from gridlight.gpu_shaders.scene_textures import SceneTextures  # noqa: E402
 from gridlight.scene.read import read_scene  # noqa: E402
-
-
-class Quiet:
-    """A ``bake.result.Reporter`` that says nothing."""
-
-    def phase(self, name, total=None):
-        pass
-
-    def advance(self, amount=1):
-        pass
-
-    def note(self, text):
-        pass
-
-    def warn(self, text):
-        pass
-
 
 # Scenes
 # ----------------------------------------------------------------------------------------------------------------------
@@ -114,7 +98,7 @@ def snapshot() -> SceneSnapshot:
 
 def bake(scene: SceneSnapshot, low, high, resolution, **settings) -> Field:
     grid = Grid.from_bounds(low, high, resolution)
-    return run_bake(scene, grid, BakeSettings(**settings), Quiet(), lambda: False).field
+    return run_bake(scene, grid, BakeSettings(**settings), Silent(), lambda: False).field
 
 
 def straight(field: Field) -> Field:
