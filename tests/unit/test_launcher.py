@@ -28,7 +28,7 @@ def checkout(tmp_path):
     shutil.copy(ROOT / "gridlight", folder)
     shutil.copy(ROOT / "cli" / "system_libraries.py", folder / "cli")
     (folder / "cli" / "__main__.py").write_text("import sys\nprint(sys.prefix, *sys.argv[1:])\nsys.exit(7)\n")
-    for name in ("bpy52.txt", "bpy45.txt", "test.txt"):
+    for name in ("bpy52.txt", "bpy45.txt", "test.txt", "farm.txt"):
         (folder / "requirements" / name).write_text("# nothing\n")
     return folder
 
@@ -59,6 +59,19 @@ def test_first_call_makes_the_environment_and_the_next_uses_it(checkout, tmp_pat
     (tmp_path / "link").symlink_to(checkout / "gridlight")
     third = launch(checkout, "x", command=tmp_path / "bin" / "gl", GRIDLIGHT_PYTHON=None, PATH="/usr/bin:/bin")
     assert (third.returncode, third.stdout, third.stderr) == (7, f"{checkout / '.venv'} x\n", "")
+
+
+def test_the_farm_has_an_environment_of_its_own_for_dask(checkout):
+    """``farm run`` and ``worker`` run there and know Blender's Python; the other farm commands need no Dask."""
+    (checkout / "farm").mkdir()
+    program = "import os, sys\nprint(sys.prefix, os.environ.get('GRIDLIGHT_BLENDER_PYTHON'), *sys.argv[1:])\n"
+    (checkout / "farm" / "__main__.py").write_text(program)
+    blender, dask = checkout / ".venv", checkout / ".venv-farm"
+    plan = launch(checkout, "farm", "plan", "a b", GRIDLIGHT_BLENDER_PYTHON=None)
+    assert plan.stdout == f"{blender} None plan a b\n" and not dask.exists(), plan.stderr
+    run = launch(checkout, "farm", "run", "JOB", GRIDLIGHT_BLENDER_PYTHON=None)
+    assert run.stdout == f"{dask} {blender / 'bin' / 'python'} run JOB\n" and "Dask" in run.stderr, run.stderr
+    assert launch(checkout, "farm", "worker", "x", GRIDLIGHT_BLENDER_PYTHON="y").stdout == f"{dask} y worker x\n"
 
 
 def test_an_interrupted_installation_is_made_again(checkout):
