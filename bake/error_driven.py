@@ -38,7 +38,7 @@ from .stopwatch import Stopwatch
 
 _CHECKED = 64  # probes from which paths are followed
 _BETWEEN = 48  # places between probes
-_FIRST_PATHS, _MOST_PATHS = 256, 4096  # of each place and set
+_FIRST_PATHS, _MOST_PATHS = 256, 2048  # of each place and set
 _DECIDED = 1.0  # standard errors between an error and its target: what a bake is held to, so more would not help
 _BLURRED = 0.3  # of the standard error: less is not the paths' doing, but the spread between probes
 _SURE = 1.0  # standard errors by which a bake has to be below its target

@@ -27,6 +27,8 @@ _GUESSED_RATIO = 200.0  # a / b
 # Seconds of a bake, in those of what does not depend on any setting (docs/measurements.md, "Error-driven bakes").
 _COST_OF_TEXELS = 1.0 / 300 / 16**2  # per probe and squared texels of a face's edge
 _COST_OF_SAMPLES = 2.0
+_MOST_OUTLYING = 4.0
+_LEAST_SHARE = 0.25
 
 
 @dataclass(frozen=True)
@@ -147,11 +149,16 @@ def next_level(
 
 def worst_probes(squared: np.ndarray, gain: float, wanted: float) -> np.ndarray:
     """(P,) bool: the fewest probes, those with the largest of the ``squared`` (P,) errors, whose errors times ``gain``
-    bring the mean of all down to ``wanted``; all where that takes more than half of them."""
+    bring the mean of all down to ``wanted``; all where that takes more than half of them.
+
+    Errors are known by one difference of two bakes: a few that are huge by chance must not hide the others, so each
+    counts as _MOST_OUTLYING times the mean at most, and fewer than _LEAST_SHARE are not worth a pass of their own.
+    """
+    squared = np.minimum(squared, _MOST_OUTLYING * squared.mean())
     order = np.argsort(-squared, kind="stable")
     saved = (1.0 - gain) * np.cumsum(squared[order])
     enough = np.flatnonzero((squared.sum() - saved) / max(len(squared), 1) <= wanted)
-    count = int(enough[0]) + 1 if len(enough) else len(squared)
+    count = max(int(enough[0]) + 1, int(_LEAST_SHARE * len(squared))) if len(enough) else len(squared)
     chosen = np.zeros(len(squared), bool)
     chosen[order[: count if count <= len(squared) // 2 else len(squared)]] = True
     return chosen

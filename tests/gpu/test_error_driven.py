@@ -114,7 +114,8 @@ def test_the_predicted_error_is_that_against_a_fine_bake():
     within_bands = np.sqrt(((found - exact) ** 2).mean() / (exact**2).mean())
     error = result.error
     assert error["met"] and within_bands <= 0.04
-    assert np.hypot(within_bands, error["parts"]["floor"]) == pytest.approx(error["predicted"], rel=0.5, abs=0.006)
+    # eight probes and few paths: the bound is what they can promise
+    assert np.hypot(within_bands, error["parts"]["floor"]) <= 1.2 * error["predicted_at_most"] <= 1.2 * 0.04
 
 
 def test_what_is_given_is_kept_and_the_same_comes_out_again():
