@@ -55,7 +55,8 @@ float visibility(int slot, vec3 probe, vec3 point)
   float variance = max(moments.y - moments.x * moments.x, grid_info[4].y * grid_info[4].y);
   float beyond = range - moments.x;
   float chance = variance / (variance + beyond * beyond);
-  return chance * chance * chance;
+  float cubed = chance * chance * chance;
+  return cubed * cubed;
 }
 
 /* `point` in node numbers, clamped to the box; `beyond`: cells past it. */
