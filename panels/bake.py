@@ -109,7 +109,7 @@ def _state(layout, context) -> None:
     elif state == STALE:
         paragraph(row, context, "The scene has changed since this light was baked. Bake again", "ERROR")
     elif state == EDITED:
-        row.label(text="Edited since the bake", icon="QUESTION")
+        row.label(text="Edited", icon="QUESTION")  # since the bake; more does not fit beside the button
         row.operator(names.CHECK_BAKE)
     else:
         row.label(text="The light is up to date", icon="CHECKMARK")

@@ -53,7 +53,9 @@ def test_bake_shows_progress_and_stores_light(person):
     assert has_ended(person) == ""
     assert "729 probes" in storage.stored_details(volume)["outcome"]
     assert storage.load_field(volume).coefficients[:, 0].max() > 0
-    yield 1.5
+    stale = person.module("operators.stale")
+    yield from person.wait_until(lambda: stale.state_of(bpy.context.scene, volume) == stale.FRESH, "its state", 20)
+    yield 0.5
     person.picture("done")
     assert person.find("up to date", person.rectangle(person.region("UI")))
 
