@@ -15,7 +15,9 @@ def build(person, radiance=RADIANCE, lamp=False):
     bpy.context.scene.gridlight.preview.live = False  # the light shall stay as it is known
     cube = bpy.data.objects["Cube"]
     cube.scale = (3, 3, 3)
-    cube.active_material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (*ALBEDO, 1)
+    principled = cube.active_material.node_tree.nodes["Principled BSDF"].inputs
+    principled["Base Color"].default_value = (*ALBEDO, 1)
+    principled["Specular IOR Level"].default_value = 0.0  # what it mirrors is spread as well and would add to ALBEDO
     if not lamp:
         bpy.data.objects.remove(bpy.data.objects["Light"])
     bpy.context.scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (0, 0, 0, 1)
