@@ -10,7 +10,6 @@ import time
 import bpy
 import numpy as np
 import pytest
-import scenes
 from gridlight.bake.error_driven import ErrorDrivenBake
 from gridlight.bake.result import Silent
 from gridlight.bake.session import BakeSession
@@ -25,6 +24,7 @@ from gridlight.formats import probe_file
 from gridlight.scene.cycles_reference import render_panoramas
 from gridlight.scene.gallery import build_gallery
 from gridlight.scene.read import read_scene
+from gridlight.tests import scenes
 
 TARGETS = (0.10, 0.05, 0.03, 0.02)
 BY_HAND = ((6, 1), (8, 1), (12, 1), (16, 2), (24, 2), (32, 4))  # face, samples
