@@ -134,7 +134,7 @@ def test_operator_takes_the_active_volume_only(scene, registered):
 
 
 def test_operator_says_what_is_missing(scene, registered):
-    with pytest.raises(RuntimeError, match="no probe volume"):
+    with pytest.raises(RuntimeError, match="Add a probe volume first"):
         bpy.ops.gridlight.place_probes()
     create_volume(scene, "One", np.eye(4), (2, 2, 2))
     with pytest.raises(RuntimeError, match="no surface"):

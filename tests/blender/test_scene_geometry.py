@@ -268,7 +268,9 @@ def test_one_mesh_read_once_for_a_thousand_instances(scene, monkeypatch):
     from gridlight.scene import read
 
     calls = []
-    monkeypatch.setattr(read, "read_mesh", lambda data, original=read.read_mesh: calls.append(1) or original(data))
+    monkeypatch.setattr(
+        read, "read_mesh", lambda *arguments, original=read.read_mesh: calls.append(1) or original(*arguments)
+    )
     data = mesh("tri", TRIANGLE, [(0, 1, 2)])
     for index in range(1000):
         place(data, location=(index, 0, 0), scale=(1, 1, -1 if index % 2 else 1))
