@@ -25,7 +25,9 @@ def scene():
     bpy.ops.mesh.primitive_cube_add(size=6.0)
     material = bpy.data.materials.new("room")
     material.use_nodes = True
-    material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (*ALBEDO, 1.0)
+    principled = material.node_tree.nodes["Principled BSDF"].inputs
+    principled["Base Color"].default_value = (*ALBEDO, 1.0)
+    principled["Specular IOR Level"].default_value = 0.0  # what it mirrors is spread as well and would add to ALBEDO
     bpy.context.object.data.materials.append(material)
     scene = bpy.context.scene
     volume = create_volume(scene, "Room", np.diag([2.5, 2.5, 2.5, 1.0]), (3, 3, 3))
