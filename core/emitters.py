@@ -15,6 +15,7 @@ from .conventions import LUMINANCE
 from .grid import Grid
 from .snapshot import SceneSnapshot
 
+CANDIDATES = 8  # points on emitters, of which a surface's shadow ray goes to one
 PROBE_POINTS = 4096  # on emitters that each probe considers besides its texels
 EMITTER_BOXES = 8  # around all of them, by which points know that none is near
 PROBE_RAYS = 256  # that it sends to them
@@ -43,6 +44,13 @@ def sampling_density(snapshot: SceneSnapshot, grid: Grid) -> np.ndarray:
     if power.sum() > 0:
         density[sampled] = luminance[sampled] / power.sum()
     return density
+
+
+def reach(density: np.ndarray) -> float:
+    """Metres within which surfaces look for emitters of ``density`` (T,) in directions about the normal: nearer than
+    this a direction finds an emitter at least as often as one of CANDIDATES points falls there. 0 without emitters."""
+    sampled = density[density > 0]
+    return float((np.pi * CANDIDATES * sampled.min()) ** -0.5) if len(sampled) else 0.0
 
 
 def _luminance(snapshot: SceneSnapshot) -> np.ndarray:

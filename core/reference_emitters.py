@@ -11,12 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from .cubemap import direction_to_texel, texel_solid_angles
-from .emitters import PROBE_POINTS, PROBE_RAYS
+from .emitters import CANDIDATES, PROBE_POINTS, PROBE_RAYS, reach
 from .reference_scene import ReferenceScene, Surfaces
 from .sampling import keys_of, sample_cosine, sample_r2, sample_r3, shifted
 from .settings import BakeSettings
 
-CANDIDATES = 8  # points on emitters of which one is traced
 _LEAST_COSINE = 1e-4  # between an emitter and the way to a probe
 _SHADOW_END = 0.9999  # of the distance to the emitter
 _CHOICE_STREAM, _DIRECTION_STREAM, _PROBE_STREAM = 0x68E31DA4, 0x3C6EF372, 0xB5297A4D
@@ -62,7 +61,7 @@ class ReferenceEmitters:
         twice_area = np.linalg.norm(across, axis=1)
         self._end = np.cumsum(density[self._triangle] * twice_area / 2)
         self._edge, self._normal = edge, across / twice_area[:, None]
-        self.reach = (np.pi * density[self._triangle].min()) ** -0.5 if self.count else 0.0
+        self.reach = reach(density)
 
     @property
     def count(self) -> int:
@@ -93,7 +92,7 @@ class ReferenceEmitters:
         )
 
     def unshadowed(self, points: np.ndarray, normals: np.ndarray, keys: np.ndarray, index) -> np.ndarray:
-        """(N, 3) irradiance by one point on the emitters if nothing stands between."""
+        """(N, 3) irradiance by candidate ``index`` of the sequences of ``keys`` (N, 3) if nothing stands between."""
         return self._arrival(self.sample(sample_r3(keys, index).astype(float)), points, normals).irradiance
 
     def _arrival(self, emitter: EmitterSamples, points: np.ndarray, normals: np.ndarray) -> _Arrival:
@@ -111,7 +110,7 @@ class ReferenceEmitters:
     def _point_share(self, density, distance, surface_cosine, emitter_cosine) -> np.ndarray:
         """(N,) share of the light from an emitter that points on emitters answer for; directions about the normal
         answer for the rest, within ``reach``."""
-        points = density * distance * distance
+        points = CANDIDATES * density * distance * distance
         directions = surface_cosine * emitter_cosine / np.pi
         return np.where(distance >= self.reach, 1.0, points / np.maximum(points + directions, 1e-300))
 

@@ -18,7 +18,7 @@ import numpy as np
 from . import direct_light
 from .conventions import LUMINANCE
 from .cubemap import direction_to_texel, octahedral_encode, pack_normal, unpack_normal
-from .emitters import sampling_density
+from .emitters import CANDIDATES, sampling_density
 from .grid import Grid
 from .patches import (
     ALL,
@@ -125,18 +125,29 @@ class ReferenceLight:
         self.direct = np.concatenate([self.direct, direct])
 
     def spread(self, points: np.ndarray, numbers: np.ndarray, part: Part) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and standard deviation (C,) of the luminance of the irradiance by ``part`` at the points of the patches
-        ``numbers`` (C,) if nothing stands between."""
+        """Mean and standard deviation (C,) of the luminance of one sample's irradiance by ``part`` at the points of the
+        patches ``numbers`` (C,) if nothing stands between.
+
+        Points on emitters are random themselves, but a sample's candidates average that: two at each place tell the
+        two variances apart.
+        """
         keys = keys_of(numbers, 0, self.settings.seed)
-        luminance = []
+        luminance = np.zeros((points.shape[1], len(numbers)))
+        candidate_variance = np.zeros(len(numbers))
         for index in range(points.shape[1]):
             point, normal = _split(points[numbers, index])
             if part == EMITTERS:
-                irradiance = self.emitters.unshadowed(point, normal, keys, index)
+                one, other = (
+                    self.emitters.unshadowed(point, normal, keys, number) @ LUMINANCE
+                    for number in (2 * index, 2 * index + 1)
+                )
+                luminance[index] = (one + other) / 2
+                candidate_variance += (one - other) ** 2 / 2 / points.shape[1]
             else:
-                irradiance = self._lamps(point, point, normal, keys, index, shadows=False, part=part)
-            luminance.append(irradiance @ LUMINANCE)
-        return np.mean(luminance, axis=0), np.std(luminance, axis=0)
+                lamps = self._lamps(point, point, normal, keys, index, shadows=False, part=part)
+                luminance[index] = lamps @ LUMINANCE
+        variance = np.maximum(luminance.var(axis=0) - candidate_variance / 2, 0.0) + candidate_variance / CANDIDATES
+        return luminance.mean(axis=0), np.sqrt(variance)
 
     def direct_light(
         self, points: np.ndarray, numbers: np.ndarray, samples: int, first_key: int = 0, part: Part = ALL

@@ -8,7 +8,7 @@ make up which stage, libraries first.
 from __future__ import annotations
 
 from ..core.conventions import DEPTH_EDGE
-from ..core.emitters import EMITTER_BOXES
+from ..core.emitters import CANDIDATES, EMITTER_BOXES
 from ..core.gradients import LEAST_COSINE
 from ..core.images import HALF_MAX
 from ..core.lookup import BEYOND, INVALID_WEIGHT, LEAST_WEIGHT
@@ -161,6 +161,7 @@ def _emitters(info, defines: dict, first: int) -> int:
     """Sampled emitters, where the scene has any; their materials are surfaces to the shader."""
     if "HAS_EMITTERS" not in defines:
         return first
+    info.define("CANDIDATES", str(CANDIDATES))
     info.define("EMITTER_BOXES", str(EMITTER_BOXES))
     _ints(info, "emitter_count")
     info.push_constant("FLOAT", "emitter_reach")

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core import bvh
-from ..core.emitters import EMITTER_BOXES
+from ..core import bvh, emitters
 from ..core.errors import InputError
 from ..core.scene_changes import SceneChanges, ShapeChange, boxes_around
 from ..core.snapshot import Light, SceneSnapshot
@@ -147,11 +146,8 @@ class SceneTextures:
         clips = np.array([m.alpha_threshold > 0 for m in snapshot.materials] or [False])
         self.has_alpha = bool(clips.any())
         self._density = density[order]
-        sampled = self._density[self._density > 0]
-        self.emitter_count = len(sampled)
-        # Nearer than this a direction about the normal finds an emitter at least as often as a point on the emitters
-        # falls there.
-        self.emitter_reach = (np.pi * sampled.min()) ** -0.5 if len(sampled) else 0.0
+        self.emitter_count = int(np.count_nonzero(self._density))
+        self.emitter_reach = emitters.reach(self._density)
         material = np.clip(snapshot.material_index[order[at]], 0, max(len(snapshot.materials) - 1, 0))
         corners = self.corners[at]
         rows = np.zeros((len(corners), 3, 4), np.float32)
@@ -264,9 +260,9 @@ def _emitters(density: np.ndarray, corners: np.ndarray, order: np.ndarray) -> np
     rows[:, 2] = density[triangle]
     parts = np.arange(len(triangle), dtype=np.float32) / np.float32(max(len(triangle), 1))
     rows[:, 3] = np.minimum(np.searchsorted(rows[:, 1], parts, side="right"), max(len(triangle) - 1, 0))
-    boxes = np.zeros((EMITTER_BOXES, 2, 4), np.float32)
-    found = boxes_around(corners[triangle], EMITTER_BOXES)
-    boxes[..., :3] = np.resize(found, (EMITTER_BOXES, 2, 3)) if len(found) else 0.0
+    boxes = np.zeros((emitters.EMITTER_BOXES, 2, 4), np.float32)
+    found = boxes_around(corners[triangle], emitters.EMITTER_BOXES)
+    boxes[..., :3] = np.resize(found, (emitters.EMITTER_BOXES, 2, 3)) if len(found) else 0.0
     return np.concatenate([rows, boxes.reshape(-1, 4)])
 
 

@@ -8,8 +8,6 @@
  * 2005): CANDIDATES points by power, one of them by what it would send here if nothing stood between.
  */
 
-const int CANDIDATES = 8;
-
 struct EmitterSample {
   vec3 point;
   vec3 normal;
@@ -69,14 +67,14 @@ EmitterSample sample_emitter(vec3 u)
 }
 
 /* Share of the light from an emitter `distance` away that points on emitters answer for; directions about the normal answer for the
- * rest. Balance heuristic (Veach and Guibas, SIGGRAPH 1995), so no estimate is larger than π·L however near the emitter is; beyond
- * emitter_reach, where directions would hardly find it, points answer for all. */
+ * rest. Balance heuristic (Veach and Guibas, SIGGRAPH 1995) of CANDIDATES points and one direction, so no estimate is larger than π·L
+ * however near the emitter is; beyond emitter_reach, where directions would hardly find it, points answer for all. */
 float point_share(float density, float distance, float surface_cosine, float emitter_cosine)
 {
   if (distance >= emitter_reach) {
     return 1.0;
   }
-  float point_density = density * distance * distance;
+  float point_density = float(CANDIDATES) * density * distance * distance;
   return point_density / (point_density + surface_cosine * emitter_cosine * 0.3183098861837907);
 }
 
@@ -157,7 +155,7 @@ vec3 emitter_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int ind
          emitter_direction_irradiance(origin, normal, key, index);
 }
 
-/* Irradiance by one point on the emitters if nothing stood between. */
+/* Irradiance by one candidate if nothing stood between: candidate `index` of the sequence of `key`. */
 vec3 emitter_unshadowed(vec3 point, vec3 normal, uvec3 key, int index)
 {
   EmitterSample emitter = sample_emitter(sample_r3(key, index));

@@ -1,9 +1,13 @@
 /* How unevenly lamps and sampled emitters light the points of each patch if nothing stands between: what decides how many of them get
  * shadow rays.
  *
- * Dispatch: one thread a patch from first_patch on; groups of 64. Writes mean and standard deviation of the luminance of the points'
+ * Points on emitters are random themselves, but a sample's candidates average that (emitter_lib.glsl): two at each place tell the two
+ * variances apart.
+ * Dispatch: one thread a patch from first_patch on; groups of 64. Writes mean and standard deviation of the luminance of one sample's
  * irradiance.
  */
+
+const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
 
 void main()
 {
@@ -13,18 +17,24 @@ void main()
   }
   int patch_index = first_patch + entry;
   uvec3 key = uvec3(uint(patch_index), 0u, uint(seed));
-  float sum = 0.0, squares = 0.0;
+  float sum = 0.0, squares = 0.0, candidate_variance = 0.0;
   for (int i = 0; i < POINTS; i++) {
     vec4 at = element(patch_points, POINTS * patch_index + i);
-    vec3 irradiance = lamps_unshadowed(at.xyz, unpack_normal(at.w), key, i);
+    vec3 normal = unpack_normal(at.w);
+    float luminance = dot(lamps_unshadowed(at.xyz, normal, key, i), LUMINANCE);
 #ifdef HAS_EMITTERS
-    irradiance += emitter_unshadowed(at.xyz, unpack_normal(at.w), key, i);
+    float one = dot(emitter_unshadowed(at.xyz, normal, key, 2 * i), LUMINANCE);
+    float other = dot(emitter_unshadowed(at.xyz, normal, key, 2 * i + 1), LUMINANCE);
+    luminance += 0.5 * (one + other);
+    candidate_variance += 0.5 * (one - other) * (one - other) / float(POINTS);
 #endif
-    float luminance = dot(irradiance, vec3(0.2126, 0.7152, 0.0722));
     sum += luminance;
     squares += luminance * luminance;
   }
   float mean = sum / float(POINTS);
-  float deviation = sqrt(max(squares / float(POINTS) - mean * mean, 0.0));
-  imageStore(spread, element_position(patch_index), vec4(mean, deviation, 0.0, 0.0));
+  float variance = max(squares / float(POINTS) - mean * mean - 0.5 * candidate_variance, 0.0);
+#ifdef HAS_EMITTERS
+  variance += candidate_variance / float(CANDIDATES);
+#endif
+  imageStore(spread, element_position(patch_index), vec4(mean, sqrt(variance), 0.0, 0.0));
 }
