@@ -29,7 +29,7 @@ from .grid import Grid
 
 POINTS = 16  # places of a patch where light is measured
 RAYS = 4  # that leave a patch for others, from its points in turn; a multiple of 4
-SAMPLES = (4, 16, 64)  # of direct light: where it is even, uneven, very uneven
+SAMPLES = (1, 4, 16, 64)  # of direct light, by the error that one would leave
 MOST_PARTS = 16  # in which direct light of lamps is kept
 EMITTERS, ALL = "emitters", "all"
 Part = tuple[int, int] | str  # of the light: a range of the list of lamps and suns, EMITTERS, or ALL
@@ -39,7 +39,9 @@ _MANY_PROBES = 128  # in smaller grids probes share less, and patches are smalle
 _LEAST_ANGLE = 0.25  # of ANGLE
 _MANY = 44000  # patches whose mean is good with the plain number of rays
 _MOST_EFFORT = 256
-UNEVEN = (0.6, 3.0)  # error of four points, of the mean light, from which on the second and third number is taken
+ERRORS = (0.28, 1.1, 4.4)  # of one sample, of the light, from which on the next of SAMPLES is taken
+SHADOWED = 0.25  # variance of light that may or may not be shadowed, of its square
+DARK = 0.1  # of the mean light: errors of darker patches are held against this
 _CELL_SHARE = 0.25  # of the grid's shortest spacing: edge of plain cells
 _LEAST_CELLS = 32  # plain cells along the diagonal of the volume's box
 VARIANTS = 3  # patches of one cell that do not see each other; hits beyond join the last
@@ -64,11 +66,17 @@ def gather_rays(samples: int) -> int:
     return 4 * -(-samples // 4)
 
 
-def direct_samples(deviation: np.ndarray, mean_light: float) -> np.ndarray:
-    """(N,) index into SAMPLES for patches whose points get irradiance of ``deviation`` (N,) from a part of the light if
-    nothing stands between: the error of its mean by four points is held against the mean light of all patches."""
-    error = deviation / np.sqrt(SAMPLES[0]) / max(mean_light, 1e-30)
-    return np.searchsorted(UNEVEN, error, side="right")
+def direct_samples(mean: np.ndarray, deviation: np.ndarray, light: np.ndarray, mean_light: float) -> np.ndarray:
+    """(N,) index into SAMPLES for patches to which a part of the light sends ``mean`` (N,) with ``deviation`` (N,) a
+    sample if nothing stands between.
+
+    The error of one sample is held against ``light`` (N,), what all parts send to the patch, so that dark corners do
+    not get noisy; but no darker than DARK of ``mean_light``, that of all patches, as nobody would see it, and no
+    brighter than that, as probes see bright patches beside others. Samples in proportion to that error give the least
+    noise for their number; ERRORS lie halfway between SAMPLES, as ratios.
+    """
+    error = np.sqrt(deviation**2 + SHADOWED * mean**2)
+    return np.searchsorted(ERRORS, error / np.maximum(np.clip(light, DARK * mean_light, mean_light), 1e-30), "right")
 
 
 def light_parts(lamps: int, has_emitters: bool) -> list[Part]:

@@ -36,7 +36,7 @@ from .patches import (
 from .rays import leave_surface, pull_back, step_off
 from .reference_emitters import ReferenceEmitters
 from .reference_scene import ReferenceScene
-from .sampling import keys_of, light_keys, sample_cosine, sample_r2, shifted
+from .sampling import keys_of, light_keys, pcg3d, sample_cosine, sample_r2, shifted
 from .settings import BakeSettings
 from .snapshot import Light
 from .world_map import world_texels
@@ -44,7 +44,7 @@ from .world_suns import extract_suns
 
 _RAISE = 0.15  # of the distance between hit and leader: both ends of a line of sight are raised by it
 _RAY_STREAM, _PATH_LIGHT_STREAM = 0x85EBCA6B, 0x1B873593
-_EMITTER_STREAM = 0x2545F491
+_EMITTER_STREAM, _PLACE_STREAM = 0x2545F491, 0x85EBCA6B
 _RAY_SPREAD = 0.5  # radians: rays between patches see images blurred
 
 
@@ -113,10 +113,10 @@ class ReferenceLight:
         numbers = np.arange(lit, self.patches.count)
         parts = light_parts(len(self._all_lamps()), self.emitters.count > 0)
         spread = {part: self.spread(self.patches.points, numbers, part) for part in parts}
-        mean_light = float(sum(mean.mean() for mean, _deviation in spread.values()))
+        light = sum((mean for mean, _deviation in spread.values()), np.zeros(len(numbers)))
         direct = np.zeros((len(numbers), 3))
-        for part, (_mean, deviation) in spread.items():
-            sample_class = direct_samples(deviation, mean_light)
+        for part, (mean, deviation) in spread.items():
+            sample_class = direct_samples(mean, deviation, light, float(light.mean()))
             for index, samples in enumerate(SAMPLES):
                 chosen = np.flatnonzero(sample_class == index)
                 direct[chosen] += self.direct_light(
@@ -125,24 +125,25 @@ class ReferenceLight:
         self.direct = np.concatenate([self.direct, direct])
 
     def spread(self, points: np.ndarray, numbers: np.ndarray, part: Part) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and standard deviation (C,) of the luminance of one sample's irradiance by ``part`` at the points of the
-        patches ``numbers`` (C,) if nothing stands between.
+        """Mean and standard deviation (C,) of the luminance of one sample's irradiance by ``part`` at every second
+        point of the patches ``numbers`` (C,) if nothing stands between.
 
         Points on emitters are random themselves, but a sample's candidates average that: two at each place tell the
         two variances apart.
         """
         keys = keys_of(numbers, 0, self.settings.seed)
-        luminance = np.zeros((points.shape[1], len(numbers)))
+        count = points.shape[1] // 2
+        luminance = np.zeros((count, len(numbers)))
         candidate_variance = np.zeros(len(numbers))
-        for index in range(points.shape[1]):
-            point, normal = _split(points[numbers, index])
+        for index in range(count):
+            point, normal = _split(points[numbers, 2 * index])
             if part == EMITTERS:
                 one, other = (
                     self.emitters.unshadowed(point, normal, keys, number) @ LUMINANCE
                     for number in (2 * index, 2 * index + 1)
                 )
                 luminance[index] = (one + other) / 2
-                candidate_variance += (one - other) ** 2 / 2 / points.shape[1]
+                candidate_variance += (one - other) ** 2 / 2 / count
             else:
                 lamps = self._lamps(point, point, normal, keys, index, shadows=False, part=part)
                 luminance[index] = lamps @ LUMINANCE
@@ -157,8 +158,9 @@ class ReferenceLight:
         keys = keys_of(first_key + numbers, 0, self.settings.seed)
         total = np.zeros((len(numbers), 3))
         each = points.shape[1]
+        shift = (pcg3d(shifted(keys, 0, _PLACE_STREAM, 0))[:, 0] % each).astype(int)
         for index in range(samples):
-            place = index * each // samples if samples < each else index % each
+            place = (index * each + shift) // samples if samples < each else index % each
             point, normal = _split(points[numbers, place])
             origin = leave_surface(point, normal)
             total += self._irradiance(point, origin, normal, keys, shifted(keys, 0, 0, _EMITTER_STREAM), index, part)

@@ -4,7 +4,7 @@ create_infos.py."""
 
 from __future__ import annotations
 
-from ..core.patches import POINTS, SAMPLES, UNEVEN
+from ..core.patches import DARK, ERRORS, POINTS, SHADOWED
 from .create_infos import _image, _ints, _samplers, _scene, _surface_files
 
 
@@ -53,12 +53,12 @@ def _pending(info, defines: dict, *names: str) -> int:
 
 def _due(info, *names: str) -> int:
     """The same for patch_due_lib."""
-    _samplers(info, "spread", "mean_lights", *names)
+    _samplers(info, "spread", "lights", "mean_lights", *names)
     _ints(info, "patch_count", "sample_class")
     _image(info, 0, "classes", pixel="R32F", access="READ+WRITE")
-    info.define("ROOT_OF_SAMPLES", repr(SAMPLES[0] ** 0.5))
-    info.define("UNEVEN", repr(UNEVEN[0]))
-    info.define("VERY_UNEVEN", repr(UNEVEN[1]))
+    info.define("SHADOWED", repr(SHADOWED))
+    info.define("DARK", repr(DARK))
+    info.define("ERRORS", f"vec3{ERRORS}")
     return 1
 
 

@@ -100,10 +100,12 @@ class PatchDirect:
 
     def _light_what_is_due(self, points: gpu.types.GPUTexture) -> Steps[None]:
         """Patches that were not lit, or with another number of samples than they should have."""
-        self._find_mean_lights()
+        lights = self._lights_together()
         kinds = [(part, index) for part in self._parts for index in range(len(SAMPLES))]
         counts = scratch(max(len(kinds), 1), "patches", "R32F")
-        lists = [self._list_due(self._parts[part], index, counts, row) for row, (part, index) in enumerate(kinds)]
+        lists = [
+            self._list_due(self._parts[part], lights, index, counts, row) for row, (part, index) in enumerate(kinds)
+        ]
         for (part, index), due, count in zip(kinds, lists, read(counts, len(kinds), channels=1)[:, 0].astype(int)):
             if count:
                 target = self._parts[part].values.texture
@@ -111,8 +113,9 @@ class PatchDirect:
                 yield from self.light(points, POINTS, due, int(count), samples, target, part=part)
         self._add_up()
 
-    def _find_mean_lights(self) -> None:
-        """What unevenness is held against: the mean light of all parts, by range of patches."""
+    def _lights_together(self) -> gpu.types.GPUTexture:
+        """What errors are held against: the mean that all parts send to each patch, and in ``_mean_lights`` the mean of
+        that by range of patches."""
         parts, ranges = list(self._parts.values()), self._together
         sums = scratch(max(len(parts) * len(ranges), 1), "patches", "R32F")
         for row, (first, stop) in enumerate(ranges):
@@ -122,8 +125,11 @@ class PatchDirect:
         target = self._mean_lights.reserve(self.count)
         for (first, stop), means in zip(ranges, table):
             fill_elements(target, first, stop - first, float(means.sum()) / max(stop - first, 1))
+        lights = scratch(self.count, "patches")
+        add_patches(lights, self.count, [light.spread.texture for light in parts])
+        return lights
 
-    def _list_due(self, light: _PartLight, index: int, counts: gpu.types.GPUTexture, row: int) -> gpu.types.GPUTexture:
+    def _list_due(self, light: _PartLight, lights, index: int, counts, row: int) -> gpu.types.GPUTexture:
         """Patches that ``light`` should light with SAMPLES[index] and has not yet, marked as lit so; their number goes
         into element ``row`` of ``counts``."""
         blocks = max(-(-self.count // COMPACTION_BLOCK), 1)
@@ -131,6 +137,7 @@ class PatchDirect:
         for name in ("compact_count_comp", "patch_due_comp"):
             shader = program(name, DUE=name == "compact_count_comp")
             shader.uniform_sampler("spread", light.spread.texture)
+            shader.uniform_sampler("lights", lights)
             shader.uniform_sampler("mean_lights", self._mean_lights.texture)
             shader.image("classes", light.classes.texture)
             shader.uniform_int("patch_count", (self.count,))

@@ -2,6 +2,7 @@
  *
  * Dispatch: RUNS threads an entry of `patches` from first_entry on, each takes SAMPLES_EACH of the samples; groups of 64. patch_mean_comp puts them together.
  * (A thread for all samples of a patch would be simpler, but software drivers end every loop of a thread that has gone round 65 535 times.)
+ * Fewer samples than points take one of each equal run of points, all the same one of their runs, which is random.
  * The key of a number is (first_key + patch, light, seed); its index counts samples, so the points of a patch share one stratified sequence.
  * patch_points, POINTS elements a patch: position, packed normal. patches: index of a patch in x.
  */
@@ -16,9 +17,10 @@ void main()
   int first = (thread_number - entry * runs) * SAMPLES_EACH;
   int patch_index = int(element(patches, first_entry + entry).x);
   uvec3 key = uvec3(uint(first_key + patch_index), 0u, uint(seed));
+  int shift = int(pcg3d(key + uvec3(0u, 0x85EBCA6Bu, 0u)).x % uint(POINTS));
   vec3 irradiance = vec3(0.0);
   for (int i = first; i < min(first + SAMPLES_EACH, samples); i++) {
-    int place = samples < POINTS ? i * POINTS / samples : i % POINTS;
+    int place = samples < POINTS ? (i * POINTS + shift) / samples : i % POINTS;
     vec4 at = element(patch_points, POINTS * patch_index + place);
     vec3 normal = unpack_normal(at.w);
     vec3 origin = leave_surface(at.xyz, normal);

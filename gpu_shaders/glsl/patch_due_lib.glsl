@@ -1,7 +1,8 @@
 /* Patches that are due to be lit by a part of the light, see compaction_lib: those that should have number `sample_class` of samples and
  * have another one or none. How many they should have: core/patches.py, direct_samples.
  *
- * spread: mean and standard deviation over a patch's points, if nothing stood between; mean_lights: what they are held against.
+ * spread: mean and standard deviation of one sample, if nothing stood between; lights and mean_lights: the mean that all parts send to the
+ * patch and to all patches.
  */
 
 int item(int entry)
@@ -14,7 +15,10 @@ bool is_selected(int patch_index)
   if (patch_index < 0 || imageLoad(classes, element_position(patch_index)).x == float(sample_class)) {
     return false;
   }
-  float error = element(spread, patch_index).y / ROOT_OF_SAMPLES / max(element(mean_lights, patch_index).x, 1.0e-30);
-  int wanted = error < UNEVEN ? 0 : error < VERY_UNEVEN ? 1 : 2;
+  vec2 one = element(spread, patch_index).xy;
+  float all = element(mean_lights, patch_index).x;
+  float light = max(clamp(element(lights, patch_index).x, DARK * all, all), 1.0e-30);
+  float error = sqrt(one.y * one.y + SHADOWED * one.x * one.x) / light;
+  int wanted = error < ERRORS.x ? 0 : error < ERRORS.y ? 1 : error < ERRORS.z ? 2 : 3;
   return wanted == sample_class;
 }

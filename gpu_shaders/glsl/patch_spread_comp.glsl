@@ -1,7 +1,7 @@
 /* How unevenly lamps and sampled emitters light the points of each patch if nothing stands between: what decides how many of them get
  * shadow rays.
  *
- * Points on emitters are random themselves, but a sample's candidates average that (emitter_lib.glsl): two at each place tell the two
+ * Every second point tells it well enough. Points on emitters are random themselves, but a sample's candidates average that (emitter_lib.glsl): two at each place tell the two
  * variances apart.
  * Dispatch: one thread a patch from first_patch on; groups of 64. Writes mean and standard deviation of the luminance of one sample's
  * irradiance.
@@ -18,21 +18,22 @@ void main()
   int patch_index = first_patch + entry;
   uvec3 key = uvec3(uint(patch_index), 0u, uint(seed));
   float sum = 0.0, squares = 0.0, candidate_variance = 0.0;
-  for (int i = 0; i < POINTS; i++) {
-    vec4 at = element(patch_points, POINTS * patch_index + i);
+  const int count = POINTS / 2;
+  for (int i = 0; i < count; i++) {
+    vec4 at = element(patch_points, POINTS * patch_index + 2 * i);
     vec3 normal = unpack_normal(at.w);
     float luminance = dot(lamps_unshadowed(at.xyz, normal, key, i), LUMINANCE);
 #ifdef HAS_EMITTERS
     float one = dot(emitter_unshadowed(at.xyz, normal, key, 2 * i), LUMINANCE);
     float other = dot(emitter_unshadowed(at.xyz, normal, key, 2 * i + 1), LUMINANCE);
     luminance += 0.5 * (one + other);
-    candidate_variance += 0.5 * (one - other) * (one - other) / float(POINTS);
+    candidate_variance += 0.5 * (one - other) * (one - other) / float(count);
 #endif
     sum += luminance;
     squares += luminance * luminance;
   }
-  float mean = sum / float(POINTS);
-  float variance = max(squares / float(POINTS) - mean * mean - 0.5 * candidate_variance, 0.0);
+  float mean = sum / float(count);
+  float variance = max(squares / float(count) - mean * mean - 0.5 * candidate_variance, 0.0);
 #ifdef HAS_EMITTERS
   variance += candidate_variance / float(CANDIDATES);
 #endif

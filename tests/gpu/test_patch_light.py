@@ -119,7 +119,9 @@ def test_uneven_light_is_the_mean_over_a_patch():
     expected = np.einsum("npi,npi->np", offset, normals) / np.linalg.norm(offset, axis=2) ** 3
     uneven = expected.std(axis=1) / expected.mean()
     assert flat.mean() > 0.99 and (uneven[flat] > 6).any() and (uneven[flat] < 0.1).any()
-    np.testing.assert_allclose(stages.direct()[flat, 0], expected.mean(axis=1)[flat], rtol=2e-4)
+    error = np.abs(stages.direct()[flat, 0] / expected.mean(axis=1)[flat] - 1)
+    assert error[uneven[flat] > 1].max() < 2e-4, "all points take part"
+    assert error.max() < 0.04, "where light is even, some do"
 
 
 # Walls

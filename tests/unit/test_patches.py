@@ -201,12 +201,21 @@ def test_few_patches_get_more_effort():
     assert patches.effort(40_000, 4) == 4 and patches.effort(1, 4096) == 256
 
 
-def test_uneven_light_gets_more_samples():
-    deviation = np.array([0.0, 1.0, 1.3, 5.9, 6.1, 100.0])
-    np.testing.assert_array_equal(patches.direct_samples(deviation, 1.0), [0, 0, 1, 1, 2, 2])
-    np.testing.assert_array_equal(patches.direct_samples(5 * deviation, 5.0), [0, 0, 1, 1, 2, 2])
-    assert (patches.direct_samples(np.zeros(3), 0.0) == 0).all()
-    assert len(SAMPLES) == 3 and all(np.diff(SAMPLES) > 0)
+def test_samples_grow_with_the_error_that_one_leaves():
+    first, second, third = patches.ERRORS
+    deviation = np.array([0.0, 0.9 * first, 1.1 * first, 0.9 * second, 1.1 * second, 0.9 * third, 1.1 * third])
+    none, ones = np.zeros(7), np.ones(7)
+    expected = [0, 0, 1, 1, 2, 2, 3]
+    np.testing.assert_array_equal(patches.direct_samples(none, deviation, ones, 1.0), expected)
+    np.testing.assert_array_equal(patches.direct_samples(none, 5 * deviation, 5 * ones, 5.0), expected)
+    assert (patches.direct_samples(none, none, none, 0.0) == 0).all()
+    # light that a shadow may take away is an error even where it is even: half of it at most
+    shadowed = 2 * deviation
+    np.testing.assert_array_equal(patches.direct_samples(shadowed, none, ones, 1.0), expected)
+    # held against the patch's own light, within bounds
+    for light, against in ((0.5, 0.5), (1e-6, 0.1), (20.0, 1.0)):
+        np.testing.assert_array_equal(patches.direct_samples(none, against * deviation, light * ones, 1.0), expected)
+    assert len(SAMPLES) == len(patches.ERRORS) + 1 and all(np.diff(SAMPLES) > 0)
 
 
 def test_gather_rays_come_in_fours():
