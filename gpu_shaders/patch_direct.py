@@ -19,7 +19,7 @@ from .programs import program
 from .scene_textures import SceneTextures
 from .textures import read, scratch
 
-_SAMPLES_EACH = 16  # of one lamp, or of emitters, that a thread takes
+_SAMPLES_EACH = 2  # of one lamp, or of emitters, that a thread takes
 _LAMPS_AT_ONCE = 32  # that a thread takes
 _THREADS_AT_ONCE = 1 << 20
 _UNLIT = -1  # in place of an index into SAMPLES

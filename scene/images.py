@@ -111,16 +111,27 @@ class ImageTable:
 
 def _to_rgba(encoded: np.ndarray, table: np.ndarray | None, image: bpy.types.Image) -> np.ndarray:
     """(rows, width, channels) as Blender stores them to linear straight RGBA."""
-    rgba = np.ones((*encoded.shape[:2], 4), np.float32)
-    colors = min(encoded.shape[2], 3)
-    source = encoded[..., :colors] if colors == 3 else encoded[..., :1]
-    rgba[..., :3] = source if table is None else table[(source * 255.0 + 0.5).astype(np.uint8)]
-    if encoded.shape[2] == 4 and image.alpha_mode != "NONE":
+    channels = encoded.shape[2]
+    decoded = encoded if table is None else _decode(encoded, table)
+    rgba = np.empty((*encoded.shape[:2], 4), np.float32)
+    if channels == 4:
+        rgba[:] = decoded
+    else:
+        rgba[..., :3] = decoded if channels == 3 else decoded[..., :1]
+    rgba[..., 3] = 1.0
+    if channels == 4 and image.alpha_mode != "NONE":
         rgba[..., 3] = encoded[..., 3]
         if table is None and image.alpha_mode != "CHANNEL_PACKED":  # float images are stored premultiplied
             alpha = rgba[..., 3:]
             np.divide(rgba[..., :3], alpha, out=rgba[..., :3], where=alpha > 0)
     return rgba
+
+
+def _decode(encoded: np.ndarray, table: np.ndarray) -> np.ndarray:
+    """Bytes, which Blender hands out as shares of 255, by ``table``."""
+    byte = encoded * np.float32(255.0)
+    byte += np.float32(0.5)
+    return table.take(byte.astype(np.uint8), mode="clip")  # no need to check bounds, and faster than an index
 
 
 def _box_filter(pixels: np.ndarray, size: int, axis: int) -> np.ndarray:

@@ -83,14 +83,19 @@ void main()
     total += run_weights[i];
   }
   float step = total / float(samples);
-  for (int i = 0; i < RUN && total > 0.0; i++) {
-    float after = before + weights[i];
-    float rays = floor(after / step + 0.5) - floor(before / step + 0.5);
-    before = after;
-    if (rays == 0.0) {
-      continue;
+  int i = total > 0.0 ? 0 : RUN;
+  while (true) {
+    /* on to the next one that gets rays: few do, and threads that run side by side should trace together */
+    float rays = 0.0;
+    while (i < RUN && rays == 0.0) {
+      float after = before + weights[i++];
+      rays = floor(after / step + 0.5) - floor(before / step + 0.5);
+      before = after;
     }
-    Candidate chosen = candidate(slot.xyz, key, lane * RUN + i);
+    if (rays == 0.0) {
+      break;
+    }
+    Candidate chosen = candidate(slot.xyz, key, lane * RUN + i - 1);
     if (!trace_any(slot.xyz, chosen.direction, chosen.distance * 0.9999)) {
       vec3 flux = chosen.radiance * (rays * step / chosen.weight);
       sh_basis(chosen.direction, basis);
