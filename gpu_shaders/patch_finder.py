@@ -39,7 +39,7 @@ class PatchFinder:
         self._scene = scene
         self._rule = upload(rule.rows(), "cells")
         self.cell = rule.cell
-        self.count = 0
+        self.count = self._most = 0  # patches; and no fewer than there are while hits are bound
         self._keys = GrowingArray("patches")
         self._points = GrowingArray("patches")
         self._seen = GrowingArray("patches", "R32F", fill=0)
@@ -121,7 +121,7 @@ class PatchFinder:
             if item_count == 0:
                 break
         if found:
-            self.count = _number_in(self._totals[0])
+            self.count = self._most = _number_in(self._totals[0])
             self._choose_points(bind, first_new)
 
     def _claim(self, bind: _Bind, items, item_count: int, variant: int, found: bool) -> None:
@@ -150,11 +150,11 @@ class PatchFinder:
         counts = self._compact("compact_count_comp", bind, items, item_count, leaders=True)
         entries = bind.entries(item_count)
         if entries <= _FEW:
-            self._reserve(self.count + bind.count)  # a hit leads one patch at most
+            self._most += entries  # a hit leads one patch at most
         else:
             blocks = -(-entries // COMPACTION_BLOCK)
-            known = _number_in(self._totals[0])
-            self._reserve(known + int(read(counts, blocks, channels=1).sum()))
+            self._most = _number_in(self._totals[0]) + int(read(counts, blocks, channels=1).sum())
+        self._reserve(self._most)
         shader = self._compaction("patch_number_comp", bind, items, item_count, leaders=True)
         for name, texture in (
             ("block_counts", counts),
