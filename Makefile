@@ -8,16 +8,16 @@ ARGUMENTS ?=
 .PHONY: test unit gpu gui demo nightly bench zip lint
 
 test:
-	@./scripts/test $(SERIES) -- tests -m "not nightly" $(ARGUMENTS)
+	@./scripts/test --quick $(SERIES) -- tests $(ARGUMENTS)
 
 unit:
-	@./scripts/test $(SERIES) -- tests/unit -m "not nightly" $(ARGUMENTS)
+	@./scripts/test --quick $(SERIES) -- tests/unit $(ARGUMENTS)
 
 gpu:
-	@./scripts/test $(SERIES) -- tests/gpu -m "not nightly" $(ARGUMENTS)
+	@./scripts/test --quick $(SERIES) -- tests/gpu $(ARGUMENTS)
 
 gui:
-	@./scripts/test $(or $(firstword $(SERIES)),5.2) -- tests/gui -m "not nightly" $(ARGUMENTS)
+	@./scripts/test --quick $(or $(firstword $(SERIES)),5.2) -- tests/gui $(ARGUMENTS)
 
 nightly:
 	@./scripts/test $(SERIES) -- tests $(ARGUMENTS)

@@ -141,3 +141,10 @@ def frames(text: str) -> list[int]:
     if last < first:
         raise argparse.ArgumentTypeError(f"'{text}' is not a range of frames A-B")
     return list(range(first, last + 1))
+
+
+def add_pictures(parser) -> None:
+    """The option that becomes ``args.pictures``."""
+    parser.add_argument(
+        "--no-pictures", dest="pictures", action="store_false", help="write no preview; the report has none then"
+    )

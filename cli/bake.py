@@ -37,6 +37,7 @@ def add_arguments(parser, in_blender: bool) -> None:
         default=[],
         help="afterwards light another state of the scene, a file or a frame, computing only what changed; repeatable",
     )
+    arguments.add_pictures(parser)
     parser.add_argument("--quiet", action="store_true", help="no progress; warnings stay")
 
 
@@ -196,10 +197,12 @@ def run(args, reporter, should_stop):
     from ..scene.read import read_scene
     from . import pipeline
     from .relighting import relight_all
+    from .result_files import NOT_CONVERGED
+    from .stopwatch import Stopwatch
 
     check(args)
     settings = settings_from(args)
-    stopwatch = pipeline.Stopwatch()
+    stopwatch = Stopwatch()
     with StagedFolder(args.output) as folder:
         with stopwatch.measure("read"):
             reporter.phase("read")
@@ -219,13 +222,13 @@ def run(args, reporter, should_stop):
         )
         title = Path(args.file or bpy.data.filepath or scene.name).name
         summary, status = pipeline.write_results(
-            title, snapshot, settings, results, folder, reporter, should_stop, stopwatch
+            title, snapshot, settings, results, folder, reporter, should_stop, stopwatch, args.pictures
         )
         if args.relight:
             summary["relight"], settled = relight_all(args, kept, folder, reporter, should_stop, stopwatch)
             summary["files"] += [entry["file"] for entry in summary["relight"]]
             summary["seconds"] = stopwatch.totals()
-            status = status if settled else pipeline.NOT_CONVERGED
+            status = status if settled else NOT_CONVERGED
         return summary, status
 
 

@@ -31,6 +31,8 @@ from ..scene.cycles_reference import render_panoramas
 from ..scene.read import read_scene
 from . import bench_scenes, pipeline
 from .bench_measure import report
+from .result_files import NOT_CONVERGED
+from .stopwatch import Stopwatch
 from .verify_points import SIX_NORMALS, FreeSpace
 
 _MOST_WARM, _WARM_SECONDS = 15, 1.5  # warm bakes, until one of the two is reached
@@ -71,7 +73,7 @@ def gridlight(request: dict, reporter, should_stop) -> int:
         nodes = free_nodes(result.field, FreeSpace(snapshot), request["nodes"], settings.seed)
         report({"nodes": nodes.tolist(), "irradiance": irradiance_at(result.field, nodes).tolist()})
     reporter.finish()
-    return 0 if result.converged or settings.bounces is not None else pipeline.NOT_CONVERGED
+    return 0 if result.converged or settings.bounces is not None else NOT_CONVERGED
 
 
 def facts_about(name: str, snapshot: SceneSnapshot, grid: Grid) -> dict:
@@ -101,7 +103,7 @@ class _Baked:
 
 
 def _bake_once(scene, name: str, settings: BakeSettings, run: str, reporter, should_stop) -> _Baked:
-    stopwatch = pipeline.Stopwatch()
+    stopwatch = Stopwatch()
     pipeline.start_gpu(reporter, stopwatch)
     with stopwatch.measure("read"):
         reporter.phase(f"read ({run})")

@@ -31,9 +31,10 @@ def run(args, reporter, should_stop):
     from ..scene.probe_objects import place_probes
     from ..scene.read import read_scene
     from . import pipeline
+    from .stopwatch import Stopwatch
 
     settings = bake.settings_from(args)
-    stopwatch = pipeline.Stopwatch()
+    stopwatch = Stopwatch()
     with StagedFolder(args.output) as folder:
         with stopwatch.measure("setup"):
             reporter.phase("build")

@@ -3,58 +3,27 @@
 
 from __future__ import annotations
 
-import time
-from contextlib import contextmanager
+from pathlib import Path
 
 import bpy
-import numpy as np
 
 from ..bake.block_session import AnySession, open_session
 from ..bake.error_driven import ErrorDrivenBake
 from ..bake.job import drive
 from ..bake.preview import write_previews
-from ..bake.result import BakeResult, is_unsettled, report_on
-from ..core.conventions import ACTIVE, CULLED, INVALID
+from ..bake.result import BakeResult, report_on
 from ..core.error_budget import ErrorGoal
 from ..core.errors import InputError
 from ..core.grid import Grid
 from ..core.probe_edits import ProbeEdits
-from ..core.ringing import ringing
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..formats import probe_file, probe_metadata
-from ..formats.file_names import volume_endings
-from ..formats.report import ReportData, VolumeReport, write_report
 from ..formats.staging import StagedFolder
 from ..gpu_shaders.context import device_description, ensure_context
-from . import worker
-
-PHASES = ("setup", "read", "cull", "capture", "light", "write", "total")
-NOT_CONVERGED = 4
-
-
-class Stopwatch:
-    """Seconds per phase of one run."""
-
-    def __init__(self):
-        self.seconds = dict.fromkeys(PHASES, 0.0)
-        self._started = time.perf_counter()
-
-    @contextmanager
-    def measure(self, phase: str):
-        started = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[phase] += time.perf_counter() - started
-
-    def add(self, seconds: dict) -> None:
-        for phase, value in seconds.items():
-            self.seconds[phase] += value
-
-    def totals(self) -> dict:
-        self.seconds["total"] = time.perf_counter() - self._started
-        return {phase: round(self.seconds[phase], 6) for phase in PHASES}
+from . import result_files, worker
+from .result_files import Origin
+from .stopwatch import Stopwatch
 
 
 def start_gpu(reporter, stopwatch: Stopwatch) -> None:
@@ -117,93 +86,21 @@ def write_results(
     reporter,
     should_stop,
     stopwatch: Stopwatch,
+    pictures: bool = True,
 ) -> tuple[dict, int]:
-    """Stages probe files, pictures and report in ``folder``. Returns (summary, exit status)."""
-    device = device_description()
-    names = volume_endings([result.field.grid.name for result in results])
-    images = []
-    with stopwatch.measure("write"):
-        reporter.phase("write")
-        for name, result in zip(names, results):
-            result.field.metadata = {
-                **result.field.metadata,
-                **probe_metadata.provenance(
-                    snapshot,
-                    result.settings or settings,
-                    device,
-                    result.iterations,
-                    result.converged,
-                    reporter.warnings,
-                ),
-                **({"error": result.error} if result.error else {}),
-            }
-            probe_file.write(folder.path(f"probes{name}.exr"), result.field)
-        reporter.phase("pictures", len(results))
-        for name, result in zip(names, results):
-            pictures = folder.path(f"preview{name}.png"), folder.path(f"preview_probes{name}.png")
-            write_previews(snapshot, result.scene, result.field, *pictures, should_stop)
-            volume = result.field.grid.name
-            images += [
-                (f"{volume}: direct light and field", pictures[0].read_bytes()),
-                (f"{volume}: probes", pictures[1].read_bytes()),
-            ]
-            reporter.advance()
-    summary = _summary(results, device, settings, stopwatch, reporter)
-    report = ReportData(
-        title=title,
-        settings=summary["settings"],
-        device=device,
-        blender=bpy.app.version_string,
-        generator=f"Gridlight {probe_metadata.program_version()}",
-        counts=summary["probes"],
-        seconds=summary["seconds"],
-        warnings=reporter.warnings,
-        images=images,
-        summary=summary,
-        volumes=[
-            VolumeReport(
-                result.field,
-                result.field.grid.name,
-                result.energy,
-                result.change,
-                result.iterations,
-                result.converged,
-                result.notes,
-                result.error,
-            )
-            for result in results
-        ],
+    """Stages all files of a bake of ``snapshot`` in ``folder``. Returns (summary, exit status)."""
+    origin = Origin(
+        title,
+        snapshot.name,
+        snapshot.frame,
+        probe_metadata.scene_hash(snapshot),
+        device_description(),
+        bpy.app.version_string,
     )
-    summary["files"] = [str(folder.folder / name) for name in [*folder.names, "report.html"]]
-    write_report(folder.path("report.html"), report)
-    return summary, NOT_CONVERGED if any(is_unsettled(result, settings) for result in results) else 0
 
+    def draw(result: BakeResult, picture: Path, probes: Path) -> None:
+        write_previews(snapshot, result.scene, result.field, picture, probes, should_stop)
 
-def _summary(results, device: str, settings: BakeSettings, stopwatch: Stopwatch, reporter) -> dict:
-    states = np.concatenate([result.field.state for result in results])
-    lit = np.concatenate([result.field.coefficients[result.field.state == ACTIVE] for result in results])
-    chosen = [result.settings or settings for result in results]
-    return {
-        **({"error": _worst_error(results)} if any(result.error for result in results) else {}),
-        "probes": {
-            "total": len(states),
-            "active": int((states == ACTIVE).sum()),
-            "culled": int((states == CULLED).sum()),
-            "invalid": int((states == INVALID).sum()),
-        },
-        "iterations": max(result.iterations for result in results),
-        "converged": all(result.converged for result in results),
-        "ringing": ringing(lit).as_dict(),
-        "seconds": stopwatch.totals(),
-        "device": device,
-        "settings": chosen[0].as_dict() if len(chosen) == 1 else settings.as_dict(),
-        "files": [],
-        "warnings": reporter.warnings,
-    }
-
-
-def _worst_error(results: list[BakeResult]) -> dict:
-    """What error-driven bakes predict: of the volume that is furthest off, and of each where there are several."""
-    volumes = [{"volume": result.field.grid.name, **result.error} for result in results]
-    worst = max(volumes, key=lambda error: np.inf if error["predicted"] is None else error["predicted"])
-    return {**worst, "volumes": volumes} if len(volumes) > 1 else results[0].error
+    return result_files.write_results(
+        origin, settings, results, folder, reporter, stopwatch, draw if pictures else None
+    )

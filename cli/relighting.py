@@ -19,6 +19,7 @@ from ..scene.open_file import open_blend, set_frame
 from ..scene.read import read_scene
 from . import pipeline
 from .bake import is_frame
+from .stopwatch import Stopwatch
 
 
 def read_state(state: str, args) -> SceneSnapshot:
@@ -38,7 +39,7 @@ def relight_all(
     folder: StagedFolder,
     reporter,
     should_stop,
-    stopwatch: pipeline.Stopwatch,
+    stopwatch: Stopwatch,
 ) -> tuple[list[dict], bool]:
     """Relights ``sessions`` for each of ``args.relight`` in order and stages their probe files.
 

@@ -11,11 +11,11 @@ from __future__ import annotations
 import queue
 import time
 import uuid
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from ..core.errors import InputError
-from . import tasks
 from .blender_process import WorkerRefused
 from .job import Job, Shard
 
@@ -52,7 +52,7 @@ class Dispatcher:
         """Does what is not done; returns the numbers of shards that were given up.
 
         Raises:
-            InputError: votes cannot be merged, or every worker refused.
+            InputError: votes cannot be merged, every worker refused, or the scheduler has gone.
         """
         for group in self._job.groups:
             self._advance(group)
@@ -90,7 +90,7 @@ class Dispatcher:
     # ------------------------------------------------------------------------------------------------------------------
 
     def _assign(self) -> None:
-        alive = set(self._pool.client.nthreads()) - self._refused
+        alive = self._workers() - self._refused
         for address in [address for address in self._running if address not in alive]:
             work, future = self._running.pop(address)
             future.cancel()
@@ -107,7 +107,7 @@ class Dispatcher:
                 else {"iteration": work.iteration, "shard": work.shard.number}
             )
             future = self._pool.client.submit(
-                tasks.execute,
+                _execute,
                 str(self._job.folder),
                 request,
                 self._timeout if work.shard else _VOTES_SECONDS,
@@ -119,6 +119,19 @@ class Dispatcher:
             )
             self._running[address] = (work, future)
             future.add_done_callback(lambda done, address=address: self._finished.put((address, done)))
+
+    def _workers(self) -> set[str]:
+        """Addresses of those that are there. Raises InputError where the scheduler has gone."""
+        client = self._pool.client
+        try:
+            if client.status == "running":
+                return set(client.nthreads())
+        except (OSError, TimeoutError, RuntimeError, ValueError):
+            pass  # it went while it was asked
+        raise InputError(
+            "the Dask scheduler has gone; what is done stays done: start it and its workers again, then "
+            f"'gridlight farm run {self._job.folder}' goes on from here"
+        )
 
     def _choose(self, address: str, alive: set[str]) -> Work | None:
         """Earlier volumes first, of them what the worker has on the GPU; what another one has only where that is gone
@@ -141,7 +154,7 @@ class Dispatcher:
         if alive:
             self._alone_since = None
             return
-        if self._refused and not set(self._pool.client.nthreads()) - self._refused:
+        if self._refused and not self._workers() - self._refused:
             raise InputError(f"no worker can serve this job; the last one: {self._refusal}")
         now = time.monotonic()
         self._alone_since = self._alone_since or now
@@ -159,6 +172,7 @@ class Dispatcher:
             return
         if self._running.get(address, (None, None))[1] is not future:
             return  # given up before
+        self._workers()  # a scheduler that goes takes all futures with it: nobody failed
         work, _ = self._running.pop(address)
         error = None if future.status == "finished" else (future.exception() or "it was cancelled")
         if isinstance(error, WorkerRefused):
@@ -204,6 +218,21 @@ class Dispatcher:
         self._poison.add(work.shard.number)
         if work.iteration == 0 and not self._has_votes_to_come(work.group):
             self._advance(work.group)
+
+
+def _task() -> Callable[[str, dict, float], dict]:
+    """What workers execute. As a function within a function it travels by value: schedulers unpack what they pass on,
+    and know nothing of Gridlight."""
+
+    def execute(job, request, seconds):
+        from gridlight.farm import tasks
+
+        return tasks.execute(job, request, seconds)
+
+    return execute
+
+
+_execute = _task()
 
 
 def _blocks(work: Work) -> tuple | None:

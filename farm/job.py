@@ -6,7 +6,7 @@
     votes/00003-HASH…       iteration 0: what the probes of a shard see of objects' back faces
     verdict/000-001-HASH…   the barrier: all votes of frame 0, volume 1 together
     light/00003-HASH…       iteration 1: the light of a shard's probes
-    result/                 probe files
+    result/                 what ``bake`` leaves: probe files, pictures, report
     events.jsonl            what happened: shards that were done, failed, were found damaged
 
 A shard is a number of blocks (core/blocks.py) of one volume at one frame. An output counts only while it matches the
@@ -24,6 +24,7 @@ from pathlib import Path
 from ..core.errors import InputError
 from . import container
 
+VERSION = 2  # of plans
 ITERATIONS = 2
 _FOLDERS = ("votes", "light")  # of the iterations' outputs
 
@@ -64,6 +65,8 @@ class Job:
         self.path = plans[0]
         self.key = container.hash_in(plans[0])
         self.plan = json.loads(plans[0].read_text(encoding="utf-8"))
+        if self.plan.get("version") != VERSION:
+            raise InputError(f"{plans[0]} is of another version of Gridlight; plan anew in an empty folder")
         self.shards = [Shard(i, f, v, tuple(blocks)) for i, (f, v, blocks) in enumerate(self.plan["shards"])]
         self._checked: dict[Path, tuple] = {}
 

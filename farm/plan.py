@@ -9,6 +9,7 @@ from pathlib import Path
 from ..cli import arguments, bake
 from ..core.errors import InputError
 from . import container
+from .job import VERSION
 from .partition import divide
 
 HELP = "reads a .blend and writes a job: scene, volumes, settings and shards"
@@ -45,7 +46,10 @@ def check(args) -> None:
 
 
 def run(args, reporter, should_stop):
+    import bpy
+
     from ..cli import pipeline
+    from ..cli.stopwatch import Stopwatch
     from ..core.errors import Cancelled
     from ..gpu_shaders.context import device_description
     from ..scene.open_file import open_blend, set_frame
@@ -54,17 +58,18 @@ def run(args, reporter, should_stop):
     check(args)
     settings = bake.settings_from(args)
     job = Path(args.output)
-    stopwatch = pipeline.Stopwatch()
+    stopwatch = Stopwatch()
     reporter.phase("read")
     scene = open_blend(args.file)
     pipeline.start_gpu(reporter, stopwatch)
     frames = args.frames or [args.frame]
     plan: dict = {
-        "version": 1,
+        "version": VERSION,
         "generator": _generator(),
         "title": Path(args.file).name,
         "settings": settings.as_dict(),
         "device": device_description(),
+        "blender": bpy.app.version_string,
         "frames": [],
         "shards": [],
     }

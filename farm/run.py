@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import signal
@@ -10,7 +11,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from ..core.errors import Cancelled, InputError
+from ..cli import arguments
+from ..core.errors import Cancelled, InputError, NoGpuError
 from .blender_process import BLENDER_PYTHON
 from .job import Job
 from .worker import need_libraries
@@ -28,6 +30,7 @@ def add_arguments(parser, in_blender: bool) -> None:
     parser.add_argument(
         "--timeout", metavar="S", type=float, default=3600.0, help="seconds that a shard may take (default %(default)g)"
     )
+    arguments.add_pictures(parser)
     parser.add_argument("--quiet", action="store_true", help="no progress; warnings stay")
 
 
@@ -45,7 +48,7 @@ def run(args, reporter, should_stop):
     if args.scheduler is None:
         need_libraries(reporter)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    _silence_dask()
     pool = _LocalPool(args.workers or 1, reporter) if args.scheduler is None else _RemotePool(args.scheduler)
     try:
         with pool:
@@ -54,16 +57,32 @@ def run(args, reporter, should_stop):
         reporter.abandon()
         reporter.note(f"what is done stays done: 'gridlight farm run {args.job}' goes on from here")
         raise Cancelled("cancelled") from None
-    return _merge(job, sorted(poison), args.quiet)
+    return _merge(job, sorted(poison), args, reporter)
 
 
-def _merge(job: Job, poison: list[int], quiet: bool):
+def _silence_dask() -> None:
+    """What Dask logs, tracebacks among it, is told by the dispatcher in a line. Importing it sets the levels of its
+    loggers."""
+    import distributed  # noqa: F401
+
+    for name in list(logging.root.manager.loggerDict):
+        if name.split(".")[0] == "distributed":
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
+def _merge(job: Job, poison: list[int], args, reporter):
     """Merges in Blender's environment, where numpy and OpenEXR are."""
-    import json
-
     command = [os.environ.get(BLENDER_PYTHON, sys.executable), "-I", str(Path(__file__).with_name("__main__.py"))]
     command += ["merge", str(job.folder), *(["--without", ",".join(map(str, poison))] if poison else [])]
-    done = subprocess.run(command + ["--quiet"] * quiet, stdout=subprocess.PIPE, text=True, check=False)
+    command += ["--quiet"] * args.quiet
+
+    def merged(*options: str):
+        return subprocess.run([*command, *options], stdout=subprocess.PIPE, text=True, check=False)
+
+    done = merged(*["--no-pictures"] * (not args.pictures))
+    if done.returncode == NoGpuError.exit_status and args.pictures:
+        reporter.note("no pictures are drawn here; 'gridlight farm merge' draws them where there is a GPU")
+        done = merged("--no-pictures")
     if done.returncode not in (0, 4):
         raise InputError(f"the shards of {job.folder} could not be merged; the line above says why")
     summary = json.loads(done.stdout.splitlines()[-1])

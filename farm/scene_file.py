@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..core.camera import Camera
 from ..core.snapshot import Image, Light, Material, SceneSnapshot, World
 from . import container
 
@@ -20,7 +21,7 @@ STILL = (*_ARRAYS, "object_names", "materials", "images")  # parts of a document
 
 def write_scene(folder: Path, snapshot: SceneSnapshot) -> dict:
     """Writes the arrays of ``snapshot`` to ``folder``; returns the document that ``SceneReader`` makes it from again,
-    plain values for JSON. Camera and volumes are left out."""
+    plain values for JSON. Volumes are left out."""
     document: dict = {name: _write_array(folder, getattr(snapshot, name)) for name in _ARRAYS}
     document["object_names"] = list(snapshot.object_names)
     document["materials"] = [_plain(material) for material in snapshot.materials]
@@ -35,6 +36,8 @@ def write_scene(folder: Path, snapshot: SceneSnapshot) -> dict:
         "map": None if world_map is None else _write_array(folder, world_map),
     }
     document["frame"], document["name"] = int(snapshot.frame), snapshot.name
+    document["camera"] = None if snapshot.camera is None else _plain(snapshot.camera)
+    document["exposure"] = float(snapshot.exposure)
     return document
 
 
@@ -63,6 +66,8 @@ class SceneReader:
                 Light(**_tuples({**light, "matrix": np.array(light["matrix"], float)})) for light in document["lights"]
             ],
             world=World(tuple(world["color"]), None if world["map"] is None else self._array(world["map"], before)),
+            camera=None if document["camera"] is None else Camera(**_arrays(document["camera"])),
+            exposure=document["exposure"],
             frame=document["frame"],
             name=document["name"],
         )
@@ -97,3 +102,7 @@ def _plain(value):
 
 def _tuples(values: dict) -> dict:
     return {name: tuple(value) if isinstance(value, list) else value for name, value in values.items()}
+
+
+def _arrays(values: dict) -> dict:
+    return {name: np.array(value) if isinstance(value, list) else value for name, value in values.items()}

@@ -14,7 +14,7 @@ from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 
 # Of a snapshot, what light transport does not see.
-_NOT_HASHED = {"volumes", "exposure", "name", "warnings", "object_names", "frame"}
+_NOT_HASHED = {"volumes", "camera", "exposure", "name", "warnings", "object_names", "frame"}
 
 
 def program_version() -> str:
@@ -41,6 +41,8 @@ def _update(digest, value) -> None:
         for item in dataclasses.fields(value):
             digest.update(item.name.encode())
             _update(digest, getattr(value, item.name))
+    elif isinstance(value, np.generic):
+        _update(digest, value.item())
     elif isinstance(value, (list, tuple)):
         digest.update(f"[{len(value)}".encode())
         for element in value:

@@ -7,6 +7,8 @@ from xml.etree import ElementTree
 import pytest
 from gridlight.cli import bench_process
 
+pytestmark = pytest.mark.any_version
+
 TINY = ("bench", "peers", "--panoramas", 2, "--face", 4, "--tolerance", 0.1, "--quiet")
 
 
@@ -87,6 +89,7 @@ def test_a_process_that_hangs_or_fails_leaves_a_reason(peer, limit_s, reason):
     assert reports == [] and reason in problem
 
 
+@pytest.mark.nightly
 def test_eevee_bakes_the_same_volume_or_says_why_not(run_gridlight):
     done = run_gridlight(*TINY, "--eevee-samples", 1)
     assert done.returncode == 0, done.stderr

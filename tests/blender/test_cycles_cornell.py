@@ -17,6 +17,8 @@ from gridlight.tests import scenes
 
 assert bpy  # gridlight's GPU modules are importable only with Blender in the process
 
+pytestmark = pytest.mark.any_version
+
 INSIDE = Grid.from_bounds([0.15] * 3, [scenes.ROOM_SIZE_M - 0.15] * 3, (5, 5, 5), "inside the walls")
 INTO_WALLS = Grid.from_bounds([-0.1] * 3, [scenes.ROOM_SIZE_M + 0.1] * 3, (5, 5, 5), "into the walls")
 TOLERANCE = 0.05

@@ -43,7 +43,9 @@ def coefficients(path):
 def test_relighting_other_files_and_frames(run_gridlight, files, tmp_path):
     out, fresh = tmp_path / "out", tmp_path / "fresh"
     states = [files["dimmed"], files["moved"], "10"]
-    done = run_gridlight("bake", files["base"], "-o", out, *BOX, *(a for s in states for a in ("--relight", s)))
+    done = run_gridlight(
+        "bake", files["base"], "-o", out, *BOX, "--no-pictures", *(a for s in states for a in ("--relight", s))
+    )
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout.splitlines()[-1])
     entries = summary["relight"]
@@ -56,7 +58,7 @@ def test_relighting_other_files_and_frames(run_gridlight, files, tmp_path):
     assert 0 < moved["probes_captured"] and moved["hierarchy"] == "refit"
     assert back["hierarchy"] == "refit" and back["converged"]
     for state, entry in zip((["dimmed"], ["moved"], ["base", "--frame", 10]), entries):
-        again = run_gridlight("bake", files[state[0]], *state[1:], "-o", fresh, *BOX)
+        again = run_gridlight("bake", files[state[0]], *state[1:], "-o", fresh, *BOX, "--no-pictures")
         assert again.returncode == 0, again.stderr
         expected, found = coefficients(fresh / "probes.exr"), coefficients(entry["file"])
         np.testing.assert_allclose(found, expected, atol=1e-5 * np.abs(expected).max())

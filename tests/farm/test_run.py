@@ -70,6 +70,14 @@ def fsync(handle):
     synchronise(handle)
 os.fsync = fsync
 """
+HOLDS_SHARD_2 = """
+synchronise = os.fsync
+def fsync(handle):
+    if "/light/.00002" in os.readlink(f"/proc/self/fd/{handle}") and once("held"):
+        time.sleep(1000)
+    synchronise(handle)
+os.fsync = fsync
+"""
 DIES_WITH_SHARD_2 = """
 synchronise = os.fsync
 def fsync(handle):
@@ -81,20 +89,21 @@ os.fsync = fsync
 
 
 @pytest.fixture
-def start(dask_python, tmp_path):
-    """Starts ``farm run`` on a job, with a body of sabotage or without; whatever still runs ends with the test."""
+def launch(tmp_path):
+    """Starts a command whose workers' Blenders are sabotaged by ``body`` if there is one. What runs ends with the
+    test."""
     started = []
 
-    def begin(job, workers, body="", *options):
+    def begin(command, body=""):
         (tmp_path / "marks").mkdir(exist_ok=True)
-        script = tmp_path / "sabotage.py"
+        script = tmp_path / f"sabotage{len(started)}.py"
         script.write_text(SABOTAGE.format(marks=str(tmp_path / "marks"), body=body))
-        python = tmp_path / "python"
+        python = tmp_path / f"python{len(started)}"
         python.write_text(f'#!/bin/sh\nshift\nexec "{sys.executable}" -I "{script}" "$@"\n')
         python.chmod(0o755)
         chosen = {"GRIDLIGHT_BLENDER_PYTHON": str(python if body else sys.executable)}
         process = subprocess.Popen(
-            [dask_python, "-I", FARM, "run", job, "--workers", str(workers), *options],
+            [*map(str, command)],
             env={**os.environ, **chosen},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -108,6 +117,33 @@ def start(dask_python, tmp_path):
     for process in started:
         if process.poll() is None:
             process.kill()
+
+
+@pytest.fixture
+def start(dask_python, launch):
+    """Starts ``farm run`` on a job with a number of workers, or with those of the scheduler at an address."""
+
+    def begin(job, workers, body="", *options):
+        where = ("--scheduler", workers) if isinstance(workers, str) else ("--workers", workers)
+        return launch([dask_python, "-I", FARM, "run", job, *where, "--no-pictures", *options], body)
+
+    return begin
+
+
+@pytest.fixture
+def cluster(dask_python, launch, tmp_path):
+    """Starts a Dask scheduler and workers, each a process of its own; returns all of them and the address."""
+
+    def begin(workers, body=""):
+        told = tmp_path / f"scheduler{len(list(tmp_path.glob('scheduler*')))}.json"
+        options = ("--host", "127.0.0.1", "--port", 0, "--no-dashboard", "--scheduler-file", told)
+        scheduler = launch([dask_python, "-I", "-m", "dask", "scheduler", *options])
+        wait_for(lambda: told.exists() and told.read_text().endswith("}"))
+        address = json.loads(told.read_text())["address"]
+        serving = [launch([dask_python, "-I", FARM, "worker", address], body) for _ in range(workers)]
+        return scheduler, serving, address
+
+    return begin
 
 
 def ended(process, status=0):
@@ -153,24 +189,55 @@ def test_a_killed_worker_is_replaced_and_its_shard_made_again(body, planned, sta
         assert len(list((job / "light").glob(".*.part"))) == 1  # what the killed one left is never taken for a result
 
 
+def held(job, tmp_path):
+    """Waits until some process has made shard 2 and holds it back before it takes its name: a try that is lost when
+    that process ends."""
+    wait_for((tmp_path / "marks" / "held").exists)
+    assert len(list((job / "light").glob(".00002.*.part"))) == 1 and not list((job / "light").glob("00002-*"))
+
+
+def assert_shard_2_was_tried_again(job, plain):
+    """The try that was lost left its temporary file; the output was made once, after the job was resumed."""
+    events = Job(job).events()
+    resumed = max(number for number, event in enumerate(events) if event["event"] == "resumed")
+    made = [number for number, event in enumerate(events) if event.get("shard") == 2 and event.get("iteration") == 1]
+    assert len(made) == 1 and made[0] > resumed and events[made[0]]["event"] == "done"
+    assert events[resumed]["there"] >= 5  # four votes and their verdict at least
+    assert len(list((job / "light").glob(".00002.*.part"))) == 1
+    assert result(job) == plain()
+
+
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT], ids=["killed", "Ctrl-C"])
-def test_a_run_that_ends_early_is_resumed(number, planned, start, plain):
+def test_a_run_that_ends_early_is_resumed(number, planned, start, plain, tmp_path):
+    """The process of ``farm run`` is its workers' scheduler."""
     job = planned()
-    process = start(job, 2)
-    wait_for(lambda: any((job / "light").glob("*.gridlight")))
+    process = start(job, 2, HOLDS_SHARD_2)
+    held(job, tmp_path)
     process.send_signal(number)
     _, errors = process.communicate(timeout=120)
     assert process.returncode == (-9 if number == signal.SIGKILL else 130)
     if number == signal.SIGINT:
         assert "goes on from here" in errors and "Traceback" not in errors
     wait_for(lambda: not servants(job))  # nobody works on without a scheduler
-    before = len([event for event in Job(job).events() if event["event"] == "done"])
-    missing = 8 - before
-    _, errors = ended(start(job, 2))
-    resumed = [event for event in Job(job).events() if event["event"] == "resumed"]
-    assert resumed and resumed[-1]["there"] >= 5  # four votes and their verdict at least
-    assert len([event for event in Job(job).events() if event["event"] == "done"]) == before + missing
-    assert result(job) == plain()
+    ended(start(job, 2))
+    assert_shard_2_was_tried_again(job, plain)
+
+
+def test_workers_of_a_scheduler_that_is_killed_and_started_again(planned, start, cluster, plain, tmp_path):
+    job = planned()
+    scheduler, workers, address = cluster(2, HOLDS_SHARD_2)
+    process = start(job, address)
+    held(job, tmp_path)
+    scheduler.kill()
+    _, errors = ended(process, status=2)
+    assert "the Dask scheduler has gone" in errors and "goes on from here" in errors and "Traceback" not in errors
+    assert "failed" not in kinds(job)  # nobody is blamed
+    for worker in workers:
+        assert worker.wait(timeout=120) is not None  # they end by themselves
+    wait_for(lambda: not servants(job))
+    _, _, address = cluster(2)
+    ended(start(job, address))
+    assert_shard_2_was_tried_again(job, plain)
 
 
 def servants(job):

@@ -5,13 +5,18 @@ import os
 
 import numpy as np
 import pytest
+from gridlight.cli import bake as bake_command
+from gridlight.cli.progress import Reporter
 from gridlight.core.conventions import INVALID
 from gridlight.core.errors import InputError
 from gridlight.farm import container
+from gridlight.farm import merge as merge_command
 from gridlight.farm.job import Job
 from gridlight.farm.shards import ShardRunner
 from gridlight.farm.votes import merge_votes
 from gridlight.formats import probe_file
+
+from .conftest import OPTIONS, parsed
 
 
 def follow(job, order=None):
@@ -25,12 +30,14 @@ def follow(job, order=None):
 
 
 def merged(farm_command, job, *options):
-    done = farm_command("merge", job.folder, *options)
+    done = farm_command("merge", job.folder, "--no-pictures", *options)
     assert done.returncode in (0, 4), done.stderr
     return done
 
 
-@pytest.mark.parametrize("count", [1, 3, 99])
+@pytest.mark.parametrize(
+    "count", [pytest.param(1, marks=pytest.mark.any_version), 3, pytest.param(99, marks=pytest.mark.any_version)]
+)
 def test_any_number_of_shards_gives_the_bytes_of_the_plain_bake(count, planned, farm_command, plain):
     job = Job(planned("--shards", str(count)))
     assert len(job.shards) == min(count, 4)
@@ -39,6 +46,27 @@ def test_any_number_of_shards_gives_the_bytes_of_the_plain_bake(count, planned, 
     assert (job.folder / "result" / "probes.exr").read_bytes() == plain()
 
 
+@pytest.mark.any_version
+def test_a_merge_leaves_what_a_bake_leaves(planned, farm_scene, tmp_path):
+    """The scene that travels with the job gives the bake's pictures; the report tells the shards' seconds."""
+    job = Job(planned())
+    follow(job)
+    merge_command.run(parsed(merge_command, job.folder), Reporter(quiet=True), lambda: False)
+    args = parsed(bake_command, farm_scene, "-o", tmp_path / "bake", *OPTIONS)
+    bake_command.run(args, Reporter(quiet=True), lambda: False)
+    names = ["preview.png", "preview_probes.png", "probes.exr", "report.html"]
+    assert sorted(os.listdir(job.folder / "result")) == sorted(os.listdir(tmp_path / "bake")) == names
+    for name in names[:3]:
+        assert (job.folder / "result" / name).read_bytes() == (tmp_path / "bake" / name).read_bytes(), name
+    seconds = {phase: 0.0 for phase in ("capture", "light")}
+    for event in job.events():
+        seconds[("capture", "light")[event["iteration"]]] += event["seconds"]
+    told = (job.folder / "result" / "report.html").read_text(encoding="utf-8")
+    for phase, value in seconds.items():
+        assert f"&quot;{phase}&quot;: {round(value, 6)}" in told
+
+
+@pytest.mark.any_version
 def test_running_twice_changes_nothing(planned, farm_command):
     job = Job(planned("--shards", "2"))
     runner, made = follow(job)
@@ -55,6 +83,7 @@ def test_running_twice_changes_nothing(planned, farm_command):
     assert Job(job.folder).key == job.key
 
 
+@pytest.mark.any_version
 def test_surfaces_stay_between_iterations_and_are_made_again_elsewhere(planned, farm_command, plain):
     job = Job(planned())
     runner, made = follow(job)
@@ -68,6 +97,7 @@ def test_surfaces_stay_between_iterations_and_are_made_again_elsewhere(planned, 
     assert (job.folder / "result" / "probes.exr").read_bytes() == plain()
 
 
+@pytest.mark.any_version
 def test_the_barrier_is_respected(planned):
     job = Job(planned())
     runner = ShardRunner(job)
@@ -89,6 +119,7 @@ def damage(path, how):
         path.write_bytes(b"")
 
 
+@pytest.mark.any_version
 @pytest.mark.parametrize("how", ["cut off", "flipped", "emptied"])
 def test_damaged_outputs_are_found_and_made_again(how, planned, farm_command, plain):
     job = Job(planned("--shards", "2"))
@@ -101,6 +132,7 @@ def test_damaged_outputs_are_found_and_made_again(how, planned, farm_command, pl
     assert (job.folder / "result" / "probes.exr").read_bytes() == plain()
 
 
+@pytest.mark.any_version
 def test_light_by_an_older_verdict_does_not_count(planned):
     """What was lit before the votes changed is as good as not there."""
     job = Job(planned("--shards", "2"))
@@ -113,6 +145,7 @@ def test_light_by_an_older_verdict_does_not_count(planned):
     assert runner.run(1, 0)["made"]
 
 
+@pytest.mark.any_version
 def test_missing_shards_are_refused_or_marked_invalid(planned, farm_command, plain, tmp_path):
     job = Job(planned())
     follow(job)
@@ -148,6 +181,7 @@ def test_frames_share_surfaces_while_only_lamps_move(planned, farm_command, plai
         assert (job.folder / "result" / f"frame_{frame:04d}" / "probes.exr").read_bytes() == plain(frame)
 
 
+@pytest.mark.any_version
 def test_other_devices_are_refused(planned, monkeypatch):
     from gridlight.farm import shards
 

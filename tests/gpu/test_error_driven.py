@@ -118,6 +118,7 @@ def test_the_predicted_error_is_that_against_a_fine_bake():
     assert np.hypot(within_bands, error["parts"]["floor"]) <= 1.2 * error["predicted_at_most"] <= 1.2 * 0.04
 
 
+@pytest.mark.any_version
 def test_what_is_given_is_kept_and_the_same_comes_out_again():
     first, second = (driven(room(), 0.05, kept=["face", "bands"], face=9, bands=2) for _ in range(2))
     assert (first.settings.face, first.settings.bands) == (9, 2)

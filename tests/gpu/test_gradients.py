@@ -103,7 +103,8 @@ ROOMS = {
 }
 
 
-@pytest.mark.parametrize("room, most", [("spot", 0.1), ("outdoors", 0.2)])
+@pytest.mark.any_version
+@pytest.mark.parametrize("room, most", [pytest.param("spot", 0.1, marks=pytest.mark.nightly), ("outdoors", 0.2)])
 def test_gradients_are_what_the_bake_changes_by(gpu_context, room, most):
     """Walls are 0.5 m and more from probes, so nothing is too near. Texels have 4°, what light does within one only the
     differences know. Outdoors the horizon, where the ground ends within a texel, is most of the error."""

@@ -9,6 +9,8 @@ from gridlight.core.snapshot import Material, World
 from hard_rooms import GREY, HALF, LAMP, SMALL, bake_room, check_whole, difference, grid, light_at, points, room, walls
 from small_scenes import bake, box, snapshot_of
 
+pytestmark = pytest.mark.any_version
+
 
 @pytest.fixture(scope="module")
 def plain(gpu_context):

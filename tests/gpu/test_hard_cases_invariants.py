@@ -18,6 +18,8 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from random_scenes import Spec, specs
 from small_scenes import AXES, bake, irradiance_at_nodes, moved
 
+pytestmark = pytest.mark.any_version
+
 SETTINGS = BakeSettings(face=4, bounces=3, capture="trace")
 PIECES, SCENES_EACH = 20, 25
 MOST_TURNED, USUALLY_TURNED = 0.3, 0.1  # share of the light that a quarter turn changes: in one scene, the median

@@ -25,6 +25,8 @@ from hard_rooms import (
 )
 from small_scenes import bake, box, frame, furnace, irradiance_at_nodes, snapshot_of
 
+pytestmark = pytest.mark.any_version
+
 
 def box_matrix(axes, centre=(0.0, 0.0, 0.0)):
     matrix = np.eye(4)

@@ -163,9 +163,13 @@ SHAPES = {
 SELDOM = {"a light more", "no emission", "emission of a wall", "a leaf without holes"}
 
 
+ONCE = {"a light less", "a map for a world", "reflectance", "an emitter moved", "an object left", "much at once"}
+
+
 def cases(table):
-    """Names of ``table``; the less telling ones run nightly."""
-    return [pytest.param(name, marks=pytest.mark.nightly) if name in SELDOM else name for name in table]
+    """Names of ``table``; the less telling ones run nightly, those that run the same passes as others once."""
+    marks = {**dict.fromkeys(SELDOM, pytest.mark.nightly), **dict.fromkeys(ONCE, pytest.mark.any_version)}
+    return [pytest.param(name, marks=marks.get(name, ())) for name in table]
 
 
 @pytest.mark.parametrize("name", cases(NO_CAPTURE))
@@ -191,7 +195,7 @@ def test_only_probes_that_can_see_a_change_capture(name, session):
     check_shape(name, session)
 
 
-@pytest.mark.parametrize("name", ["an object moved", "an object left"])
+@pytest.mark.parametrize("name", cases(["an object moved", "an object left"]))
 def test_the_same_with_rasterised_surfaces(name, raster_session):
     check_shape(name, raster_session)
 
@@ -221,6 +225,7 @@ def test_large_changes_begin_in_the_dark(session):
     assert not relit_there_and_back(session, lambda s: replace(s, lights=[])).relit.warm_start
 
 
+@pytest.mark.any_version
 def test_what_turns_black_is_bound_anew(session):
     """Surfaces that reflect nothing have no patches; only probes that had been moved out of walls capture for that."""
     new = with_material(rooms(), 2, base_color=(0.0, 0.0, 0.0))
@@ -230,6 +235,7 @@ def test_what_turns_black_is_bound_anew(session):
     assert_same_bake(result, bake(new, grid(), session.settings))
 
 
+@pytest.mark.any_version
 def test_a_number_of_bounces_is_that_many():
     session = session_of(rooms(), bounces=2)
     new = with_light(rooms(), 0, color=(3.05, 3.0, 3.0))
@@ -245,6 +251,7 @@ def sunny(row, column):
     return World(map=sky)
 
 
+@pytest.mark.any_version
 def test_suns_of_the_world_come_move_and_go():
     """They are lamps behind the scene's own in the list."""
     where = grid((3, 2, 2))
@@ -261,19 +268,36 @@ def test_suns_of_the_world_come_move_and_go():
         assert_same_bake(session.result, bake(new, where, session.settings))
 
 
-@pytest.mark.parametrize("memory_mib", [512, pytest.param(16, marks=pytest.mark.nightly)], ids=["kept", "given up"])
-def test_relighting_several_blocks(memory_mib):
-    """Blocks keep their texel surfaces while only lamps differ, if the memory budget lets them; else all is anew."""
-    where, face = (grid(), 8) if memory_mib == 512 else (grid((6, 6, 3)), 32)
-    settings = BakeSettings(**{**SETTINGS, "block": where.count // 2, "memory_mib": memory_mib, "face": face})
+def check_blocks(where, changes, captures, **settings):
+    """Relights ``where`` in two blocks for one change after the other."""
+    settings = BakeSettings(**{**SETTINGS, "block": where.count // 2, "bounces": 3, **settings})
     session = open_session(rooms(), where, settings, Silent())
     followed(session.bake())
-    assert (len(session.open_blocks) == 1) == (memory_mib == 16)
-    for new in (with_light(rooms(), 0, color=(1.0, 3.0, 3.0)), with_moved(rooms(), 2, (0.1, 0.4, 0.0))):
-        captures_few = new.lights[0].color != rooms().lights[0].color and memory_mib == 512
+    for new, captures_few in zip(changes, captures):
         followed(session.relight(new))
         assert_same_bake(session.result, bake(new, where, settings))
         assert (session.result.relit.probes_captured < where.count // 2) == captures_few
+    return session
+
+
+MOVED = with_moved(rooms(), 2, (0.1, 0.4, 0.0))
+
+
+@pytest.mark.any_version
+def test_relighting_several_blocks():
+    """Blocks keep their texel surfaces while only lamps differ, if the memory budget lets them."""
+    session = check_blocks(grid((4, 2, 1)), [with_light(rooms(), 0, color=(1.0, 3.0, 3.0))], [True], face=5)
+    assert len(session.open_blocks) == 2
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("memory_mib", [512, 16], ids=["kept", "given up"])
+def test_relighting_several_blocks_anew(memory_mib):
+    """Where shapes differ, or surfaces of blocks do not fit the budget together, all is anew."""
+    where, face = (grid(), 8) if memory_mib == 512 else (grid((6, 6, 3)), 32)
+    changes = [with_light(rooms(), 0, color=(1.0, 3.0, 3.0)), MOVED]
+    session = check_blocks(where, changes, [memory_mib == 512, False], face=face, memory_mib=memory_mib)
+    assert (len(session.open_blocks) == 1) == (memory_mib == 16)
 
 
 @pytest.mark.nightly

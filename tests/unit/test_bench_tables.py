@@ -6,6 +6,8 @@ from xml.etree import ElementTree
 import pytest
 from gridlight.cli import bench_chart, bench_frame, bench_pareto, bench_scaling, bench_table
 
+pytestmark = pytest.mark.any_version
+
 
 def row(size, seconds, **phases):
     return {"size": size, "seconds": seconds, "phases": phases}

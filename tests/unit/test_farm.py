@@ -6,13 +6,15 @@ import os
 
 import numpy as np
 import pytest
+from gridlight.core.camera import look
 from gridlight.core.errors import InputError
 from gridlight.core.snapshot import Image, Light, Material, SceneSnapshot, World
 from gridlight.farm import container, cost
-from gridlight.farm.job import Job
+from gridlight.farm.job import VERSION, Job
 from gridlight.farm.partition import divide
 from gridlight.farm.scene_file import SceneReader, write_scene
 from gridlight.farm.shard import chosen
+from gridlight.formats.probe_metadata import scene_hash
 
 
 def test_a_container_holds_what_was_put_in(tmp_path):
@@ -50,6 +52,8 @@ def test_a_scene_is_read_back_bit_by_bit(tmp_path):
         [Image("i", generator.random((2, 3, 4)).astype(np.float32), "CLIP")],
         [Light("l", "SPOT", (1e-300, np.pi, 3.0), matrix, spot_scale=(1.0, 0.1, 2.0))],
         World((0.1, 0.2, 0.3), generator.random((4, 8, 3)).astype(np.float32)),
+        camera=look((1.0, 2.0, 1e-7), (0.0, 0.0, 1 / 3), 1.5),
+        exposure=0.1,
         frame=-3,
         name="S",
     )
@@ -64,7 +68,10 @@ def test_a_scene_is_read_back_bit_by_bit(tmp_path):
     np.testing.assert_array_equal(found.lights[0].matrix, matrix)
     assert found.lights[0].color == snapshot.lights[0].color and found.lights[0].spot_scale == (1.0, 0.1, 2.0)
     np.testing.assert_array_equal(found.world.map, snapshot.world.map)
-    assert (found.frame, found.name) == (-3, "S")
+    assert (found.frame, found.name, found.exposure) == (-3, "S", 0.1)
+    for name in ("position", "right", "up", "forward"):
+        np.testing.assert_array_equal(getattr(found.camera, name), getattr(snapshot.camera, name))
+    assert scene_hash(found) == scene_hash(snapshot)
     assert reader.read(document).vertices is found.vertices  # arrays that stay are not read again
 
 
@@ -80,7 +87,8 @@ def test_shards_hold_every_block_once_in_runs_of_like_size(shards):
 
 
 def job_of(folder, shards=5):
-    plan = {"frames": [{"frame": 1, "volumes": [{"name": "v"}]}], "shards": [[0, 0, [i]] for i in range(shards)]}
+    frames = [{"frame": 1, "volumes": [{"name": "v"}]}]
+    plan = {"version": VERSION, "frames": frames, "shards": [[0, 0, [i]] for i in range(shards)]}
     container.write_bytes(folder, "plan", [json.dumps(plan).encode()], ".json")
     return Job(folder)
 

@@ -15,6 +15,8 @@ from gridlight.core.field import Field
 from gridlight.core.grid import Grid
 from gridlight.formats import probe_file
 
+pytestmark = pytest.mark.any_version
+
 MUTATOR = Path(__file__).with_name("mutate_probe_files.py")
 
 

@@ -21,7 +21,7 @@ def room(tmp_path_factory, run_gridlight):
     folder = tmp_path_factory.mktemp("room")
     blend = folder / "room.blend"
     subprocess.run([sys.executable, "-I", HERE / "build_room.py", blend], check=True, capture_output=True, timeout=120)
-    volume = ["--min", "-1.8,-2.3,0.2", "--max", "1.8,2.3,2.8", "--resolution", "5,6,5"]
+    volume = ["--min", "-1.8,-2.3,0.2", "--max", "1.8,2.3,2.8", "--resolution", "5,6,5", "--no-pictures"]
     done = run_gridlight("bake", blend, "-o", folder / "bake", *volume, "--quiet")
     assert done.returncode == 0, done.stderr
     done = run_gridlight("export", folder / "bake/probes.exr", "--to", "three", "-o", folder / "web", "--scene", blend)
