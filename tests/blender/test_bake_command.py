@@ -373,6 +373,7 @@ def test_names_from_the_file_are_escaped_in_the_report(run_gridlight, tmp_path):
 # --------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.any_version
 def test_demo(run_gridlight, tmp_path):
     done = run_gridlight("demo", "-o", tmp_path / "demo")
     assert done.returncode == 0, done.stderr
