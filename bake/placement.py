@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core import clearance, relocation
 from ..core.grid import Grid
-from ..core.orientation import ShellVote, inside_solid
+from ..core.orientation import ShellVote
 from ..core.steps import Steps
 from ..gpu_shaders.backend import GpuBackend
 from ..gpu_shaders.probe_views import exits, sightings
@@ -28,7 +28,7 @@ class Placement:
     step: np.ndarray  # (S, 3) metres from there to where it captures
     shares: np.ndarray  # (S, 4) of the sphere, see GpuBackend.read_shares
     misplaced: np.ndarray  # (S,) bool: worth moving, as seen from home
-    went_back: np.ndarray  # (S,) bool: was moved, saw no light there and went home
+    went_back: np.ndarray  # (S,) bool: was moved, stood no better there and went home
     light_elsewhere: bool = False  # probes of other blocks see light
 
     @classmethod
@@ -57,14 +57,14 @@ class Placement:
     @property
     def is_outdated(self) -> bool:
         """Do ``shares`` of other light ask to move probes that stand at home, or home those that moved?"""
-        candidates = self._misplaced_now() & ~self.by_hand & (~self.misplaced | self.went_back)
-        return bool((candidates & ~self.moved).any() or (_in_the_dark(self.shares) & self.moved).any())
+        candidates = self.misplaced_now() & ~self.by_hand & (~self.misplaced | self.went_back)
+        return bool((candidates & ~self.moved).any() or (self.misplaced_now() & self.moved).any())
 
     def remember_misplaced(self) -> None:
         """Notes which probes are worth moving, as seen from home."""
-        self.misplaced = self._misplaced_now() & ~self.by_hand
+        self.misplaced = self.misplaced_now() & ~self.by_hand
 
-    def _misplaced_now(self) -> np.ndarray:
+    def misplaced_now(self) -> np.ndarray:
         return relocation.misplaced(self.shares, self.light_elsewhere)
 
 
@@ -132,8 +132,9 @@ def _statistics(batches: Batches, index: int, backend: GpuBackend) -> Steps[None
 def _relocate(
     placement: Placement, batches: Batches, backend: GpuBackend, grid: Grid, obstacles: Callable[[], np.ndarray]
 ) -> Steps[None]:
-    """Moves probes that stand in or behind walls. One that sees no light from its new place either goes back. Where
-    they came out, and in rooms with their normals outwards, they keep clear of surfaces too."""
+    """Moves probes that stand in or behind walls. One that still does at its new place goes back; one that came out
+    into a dark room stays, or the wall of that room would be left to probes of the lit one next door. Where they came
+    out, and in rooms with their normals outwards, they keep clear of surfaces too."""
     candidates = np.flatnonzero(placement.misplaced)
     step = placement.step
     for index in range(batches.count):
@@ -155,7 +156,7 @@ def _relocate(
     if not len(moved):
         return
     yield from _stand(placement, moved, batches, backend)
-    back = moved[_in_the_dark(placement.shares[moved]) & placement.misplaced[moved]]
+    back = moved[placement.misplaced_now()[moved] & placement.misplaced[moved]]
     placement.went_back[back] = True
     step[back] = 0.0
     yield from _stand(placement, back, batches, backend)
@@ -170,8 +171,3 @@ def _stand(placement: Placement, changed: np.ndarray, batches: Batches, backend:
         if len(batches.slots_of(index, changed)):
             yield from _statistics(batches, index, backend)
     placement.shares = backend.read_shares()
-
-
-def _in_the_dark(shares: np.ndarray) -> np.ndarray:
-    """(L,) bool of probes that a move did not help."""
-    return (shares[:, 2] == 0) | inside_solid(shares)

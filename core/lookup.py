@@ -3,11 +3,12 @@
 
 Irradiance at a point is the trilinear blend of the eight probes around it, each led to the point by half of its
 gradient: two first-order expansions so blended reproduce the second order as well. Each is weighted by whether it sees
-the point (Chebyshev's inequality on the depth moments of its octahedral map; Donnelly and Lauritzen, I3D 2006; Majercik
-et al., JCGT 2019). There is no weight for the surface's orientation: it would bend the interpolation in open space, and
-a probe behind a wall is already found by its depth. Culled probes hang in free air, have no statistics and count as
-seen. Points outside the box are clamped to it, but gradients lead on for half a cell. GLSL twin: lookup_lib.glsl and
-field_lib.glsl.
+the point: Chebyshev's inequality on the depth moments of its octahedral map (Donnelly and Lauritzen, I3D 2006; Majercik
+et al., JCGT 2019), asked of inverse distances. A plane's inverse distance is linear in the direction, so what is
+blended between texels lies on the wall, where a mean of distances at a slant lies behind it. There is no weight for the
+surface's orientation: it would bend the interpolation in open space, and a probe behind a wall is already found by its
+depth. Culled probes hang in free air, have no statistics and count as seen. Points outside the box are clamped to it,
+but gradients lead on for half a cell. GLSL twin: lookup_lib.glsl and field_lib.glsl.
 """
 
 from __future__ import annotations
@@ -21,10 +22,11 @@ from .field import Field
 from .gradients import per_cell
 from .grid import Grid
 
-LEAST_WEIGHT = 1e-4  # of an active probe that does not see the point: decides only where none does
-INVALID_WEIGHT = 1e-7  # of probes inside solids, which carry their neighbours' light
+LEAST_WEIGHT = 1e-6  # of an active probe that does not see the point: decides only where none does
+INVALID_WEIGHT = 1e-9  # of probes inside solids, which carry their neighbours' light
 BEYOND = 0.5  # cells past the box that gradients lead on
-_SHARPNESS = 6  # power of the chance: the third let through twice as much, in open space both err alike
+_SHARPNESS = 8  # power of the chance: the sixth lets through a quarter more, in open space both err alike
+LEAST_DISTANCE = 1e-6  # of the depth clamp: what a surface at no distance counts as
 _POINTS_AT_ONCE = 1 << 13
 _CORNERS = np.array([[corner & 1, corner >> 1 & 1, corner >> 2] for corner in range(8)])
 
@@ -104,9 +106,12 @@ def visibility(field: Field, nodes: np.ndarray, points: np.ndarray) -> np.ndarra
     distance = np.linalg.norm(offset, axis=2)
     away = distance > 0
     direction = np.where(away[..., None], offset, [0, 0, 1]) / np.where(away, distance, 1)[..., None]
-    moments = _sample_moments(field.depth, nodes, direction)
-    beyond = np.minimum(distance, depth_clamp(field.grid)) - moments[..., 0]
-    variance = np.maximum(moments[..., 1] - moments[..., 0] ** 2, least_deviation(field.grid) ** 2)
+    clamp = depth_clamp(field.grid)
+    inverse, variance = np.moveaxis(_sample_inverse(field.depth / [clamp, clamp**2], nodes, direction), -1, 0)
+    inverse_there = np.maximum(clamp / np.where(away, distance, 1), 1.0)
+    beyond = inverse - inverse_there
+    least = least_deviation(field.grid) / clamp * inverse * inverse_there
+    variance = np.maximum(variance, least**2)
     chance = variance / (variance + beyond * beyond)
     return np.where(away & (beyond > 0), chance**_SHARPNESS, 1.0)
 
@@ -127,9 +132,17 @@ def irradiance(field: Field, points: np.ndarray, normals: np.ndarray) -> np.ndar
     return result
 
 
-def _sample_moments(depth: np.ndarray, nodes: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """(…, 2) bilinear sample of octahedral ``depth`` (P, DEPTH_EDGE², 2) of ``nodes`` (…) along ``directions`` (…,
-    3)."""
+def inverse_moments(depth: np.ndarray) -> np.ndarray:
+    """(…, 2) mean and variance of the inverse of a distance whose mean and mean square are ``depth`` (…, 2), to second
+    order about the mean; a spread as large as the mean counts in full, no more."""
+    mean = np.maximum(depth[..., 0].astype(float), LEAST_DISTANCE)
+    spread = np.maximum(depth[..., 1] / mean**2 - 1.0, 0.0)
+    return np.stack([(1.0 + np.minimum(spread, 1.0)) / mean, spread / mean**2], axis=-1)
+
+
+def _sample_inverse(depth: np.ndarray, nodes: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """(…, 2) bilinear sample of the inverse moments of octahedral ``depth`` (P, DEPTH_EDGE², 2) of ``nodes`` (…) along
+    ``directions`` (…, 3)."""
     position = (octahedral_encode(directions) * 0.5 + 0.5) * DEPTH_EDGE - 0.5
     corner = np.floor(position).astype(int)
     blend = position - corner
@@ -137,7 +150,7 @@ def _sample_moments(depth: np.ndarray, nodes: np.ndarray, directions: np.ndarray
     for step in np.ndindex(2, 2):
         texel = _wrap_octahedral(corner + step)
         weight = np.where(step, blend, 1 - blend).prod(axis=-1)
-        result = result + weight[..., None] * depth[nodes, texel[..., 1] * DEPTH_EDGE + texel[..., 0]]
+        result = result + weight[..., None] * inverse_moments(depth[nodes, texel[..., 1] * DEPTH_EDGE + texel[..., 0]])
     return result
 
 

@@ -11,7 +11,7 @@ from ..core.conventions import DEPTH_EDGE
 from ..core.emitters import CANDIDATES, EMITTER_BOXES
 from ..core.gradients import LEAST_COSINE
 from ..core.images import HALF_MAX
-from ..core.lookup import BEYOND, INVALID_WEIGHT, LEAST_WEIGHT
+from ..core.lookup import BEYOND, INVALID_WEIGHT, LEAST_DISTANCE, LEAST_WEIGHT
 
 NO_SURFACE = "1.0e30"
 # What shaders begin with that sum up a probe's texels.
@@ -47,6 +47,7 @@ def _scene(info, defines: dict, first: int = 0, attributes: bool = True) -> int:
 def _lookup(info, first: int) -> int:
     info.define("DEPTH_EDGE", str(DEPTH_EDGE))
     info.define("LEAST_WEIGHT", repr(LEAST_WEIGHT))
+    info.define("LEAST_DISTANCE", repr(LEAST_DISTANCE))
     info.define("INVALID_WEIGHT", repr(INVALID_WEIGHT))
     info.define("BEYOND", repr(BEYOND))
     info.uniform_buf(0, "vec4", "grid_info[5]")

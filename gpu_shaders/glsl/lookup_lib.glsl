@@ -24,19 +24,24 @@ ivec2 wrap_octahedral(ivec2 texel)
   return texel;
 }
 
-vec2 fetch_moments(int slot, ivec2 texel)
+/* Mean and variance of the inverse distance, in those of the depth clamp: planes are linear in it. */
+vec2 fetch_inverse(int slot, ivec2 texel)
 {
   texel = wrap_octahedral(texel);
-  return element(depth_moments, (slot * DEPTH_EDGE + texel.y) * DEPTH_EDGE + texel.x).xy;
+  vec2 depth = element(depth_moments, (slot * DEPTH_EDGE + texel.y) * DEPTH_EDGE + texel.x).xy;
+  float inverse = 1.0 / max(depth.x / grid_info[3].w, LEAST_DISTANCE);
+  float scaled = inverse / grid_info[3].w;
+  float spread = max(depth.y * scaled * scaled - 1.0, 0.0);
+  return vec2(inverse * (1.0 + min(spread, 1.0)), inverse * inverse * spread);
 }
 
-vec2 sample_moments(int slot, vec3 direction)
+vec2 sample_inverse(int slot, vec3 direction)
 {
   vec2 position = (octahedral_encode(direction) * 0.5 + 0.5) * float(DEPTH_EDGE) - 0.5;
   ivec2 corner = ivec2(floor(position));
   vec2 blend = position - vec2(corner);
-  return mix(mix(fetch_moments(slot, corner), fetch_moments(slot, corner + ivec2(1, 0)), blend.x),
-             mix(fetch_moments(slot, corner + ivec2(0, 1)), fetch_moments(slot, corner + ivec2(1, 1)), blend.x), blend.y);
+  return mix(mix(fetch_inverse(slot, corner), fetch_inverse(slot, corner + ivec2(1, 0)), blend.x),
+             mix(fetch_inverse(slot, corner + ivec2(0, 1)), fetch_inverse(slot, corner + ivec2(1, 1)), blend.x), blend.y);
 }
 
 /* How likely the probe in `slot` sees `point`, 0..1. */
@@ -47,16 +52,19 @@ float visibility(int slot, vec3 probe, vec3 point)
   if (squared == 0.0) {
     return 1.0;
   }
-  float range = min(sqrt(squared), grid_info[3].w);
-  vec2 moments = sample_moments(slot, offset * inversesqrt(squared));
-  if (range <= moments.x) {
+  float distance = sqrt(squared);
+  vec2 inverse = sample_inverse(slot, offset / distance);
+  float inverse_there = max(grid_info[3].w / distance, 1.0);
+  float beyond = inverse.x - inverse_there;
+  if (beyond <= 0.0) {
     return 1.0;
   }
-  float variance = max(moments.y - moments.x * moments.x, grid_info[4].y * grid_info[4].y);
-  float beyond = range - moments.x;
+  float least = grid_info[4].y / grid_info[3].w * inverse.x * inverse_there;
+  float variance = max(inverse.y, least * least);
   float chance = variance / (variance + beyond * beyond);
-  float cubed = chance * chance * chance;
-  return cubed * cubed;
+  chance *= chance;
+  chance *= chance;
+  return chance * chance;
 }
 
 /* `point` in node numbers, clamped to the box; `beyond`: cells past it. */

@@ -140,6 +140,40 @@ def test_the_depth_map_has_no_seams():
     angle = np.linspace(0, 2 * np.pi, 4000)
     for axis in range(3):
         circle = np.roll(np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1), axis, axis=1)
-        sampled = lookup._sample_moments(field.depth, np.zeros(len(circle), int), circle)[:, 0]
+        sampled = 1 / lookup._sample_inverse(field.depth, np.zeros(len(circle), int), circle)[:, 0]
         assert np.abs(np.diff(sampled)).max() < 0.01
         assert np.abs(sampled - (2 + circle @ [0.3, 0.5, -0.4])).max() < 0.12
+
+
+def blurred_depth_of(distance_along, clamp):
+    """(DEPTH_EDGE², 2) moments as a bake stores them: over one and a half texels (probe_statistics_comp.glsl)."""
+    texels = np.stack(np.meshgrid(np.arange(DEPTH_EDGE), np.arange(DEPTH_EDGE)), axis=-1).reshape(-1, 1, 2)
+    steps = (np.stack(np.meshgrid(np.arange(4), np.arange(4)), axis=-1).reshape(1, -1, 2) - 1.5) * 0.375
+    uv = (texels + 0.5 + steps) * (2 / DEPTH_EDGE) - 1
+    for axis in (0, 1):  # past the edge the sphere goes on where the edge is mirrored to
+        past = np.abs(uv[..., axis]) > 1
+        uv[..., axis] = np.where(past, np.sign(uv[..., axis]) * 2 - uv[..., axis], uv[..., axis])
+        uv[..., 1 - axis] = np.where(past, -uv[..., 1 - axis], uv[..., 1 - axis])
+    distance = np.minimum(distance_along(octahedral_decode(uv.reshape(-1, 2))), clamp).reshape(len(texels), -1)
+    return np.stack([distance.mean(axis=1), (distance**2).mean(axis=1)], axis=1)
+
+
+@pytest.mark.parametrize("apart", [0.05, 0.3, 0.45])
+def test_a_wall_seen_at_a_slant_hides_what_is_behind_it(apart):
+    """A probe ``apart`` from a wall of 10 cm, in cells of 1 m: whoever stands behind the wall, however far along it,
+    is not seen; who stands before it is."""
+    field = open_field((2, 2, 2), np.diag([0.5, 0.5, 0.5, 1.0]))
+    probe = field.grid.positions()[0]
+    clamp = lookup.depth_clamp(field.grid)
+
+    def wall(d):
+        return np.where(d[:, 0] > 1e-3, apart / np.maximum(d[:, 0], 1e-3), clamp)
+
+    field.depth[0] = blurred_depth_of(wall, clamp)
+    random = np.random.default_rng(4)
+    along = random.uniform(0, 1, (2000, 2))
+    behind = probe + np.column_stack([np.full(2000, apart + 0.1 + 0.02), along])
+    nodes = np.zeros((2000, 1), int)
+    assert lookup.visibility(field, nodes, behind).mean() < 0.1
+    before = probe + np.column_stack([np.full(2000, 0.5 * apart), along])
+    assert lookup.visibility(field, nodes, before).mean() > 0.6
