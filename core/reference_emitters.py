@@ -36,8 +36,7 @@ class _Arrival:
     """Light from points on emitters at surfaces, if nothing stands between."""
 
     irradiance: np.ndarray  # (N, 3)
-    direction: np.ndarray  # (N, 3)
-    distance: np.ndarray  # (N,)
+    point: np.ndarray  # (N, 3) on the emitter
 
 
 @dataclass
@@ -105,7 +104,7 @@ class ReferenceEmitters:
         emitter_cosine = np.abs(np.einsum("ni,ni->n", direction, emitter.normal))
         share = self._point_share(emitter.density, distance, surface_cosine, emitter_cosine)
         factor = surface_cosine * emitter_cosine / (squared * emitter.density) * share
-        return _Arrival(emitter.radiance * factor[:, None], direction, distance)
+        return _Arrival(emitter.radiance * factor[:, None], emitter.point)
 
     def _point_share(self, density, distance, surface_cosine, emitter_cosine) -> np.ndarray:
         """(N,) share of the light from an emitter that points on emitters answer for; directions about the normal
@@ -118,7 +117,7 @@ class ReferenceEmitters:
         """Resampled: CANDIDATES points by power, one of them by what it would send if nothing stood between; a single
         number chooses among them one after the other."""
         choice = sample_r3(shifted(keys, _CHOICE_STREAM, 0, 0), index)[:, 0].astype(float)
-        best = _Arrival(np.zeros_like(points), np.zeros_like(points), np.zeros(len(points)))
+        best = _Arrival(np.zeros_like(points), np.zeros_like(points))
         best_weight, total = np.zeros(len(points)), np.zeros(len(points))
         for candidate in range(CANDIDATES):
             u = sample_r3(keys, np.asarray(index) * CANDIDATES + candidate).astype(float)
@@ -130,10 +129,14 @@ class ReferenceEmitters:
             choice[taken] *= total[taken] / weight[taken]
             choice[left] = (choice[left] * total[left] - weight[left]) / (total[left] - weight[left])
             best_weight[taken] = weight[taken]
-            for name in ("irradiance", "direction", "distance"):
+            for name in ("irradiance", "point"):
                 getattr(best, name)[taken] = getattr(arrival, name)[taken]
         lit = np.flatnonzero(best_weight > 0)
-        lit = lit[self.scene.visible(origins[lit], best.direction[lit], best.distance[lit] * _SHADOW_END)]
+        # From where the ray starts, which is not the surface: to an emitter a few centimetres away it would be too long
+        # and meet the emitter itself.
+        way = best.point[lit] - origins[lit]
+        length = np.maximum(np.linalg.norm(way, axis=1), 1e-20)
+        lit = lit[self.scene.visible(origins[lit], way / length[:, None], length * _SHADOW_END)]
         result = np.zeros_like(points)
         result[lit] = best.irradiance[lit] * (total[lit] / (best_weight[lit] * CANDIDATES))[:, None]
         return result

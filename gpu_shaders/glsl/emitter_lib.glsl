@@ -81,8 +81,8 @@ float point_share(float density, float distance, float surface_cosine, float emi
 /* Irradiance by points on emitters, one shadow ray: sample `index` of the sequence of `key`. */
 vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
 {
-  vec3 best_irradiance = vec3(0.0), best_direction = vec3(0.0);
-  float best_distance = 0.0, best_weight = 0.0, total = 0.0;
+  vec3 best_irradiance = vec3(0.0), best_point = vec3(0.0);
+  float best_weight = 0.0, total = 0.0;
   float choice = sample_r3(key + uvec3(0x68E31DA4u, 0u, 0u), index).x;
   for (int i = 0; i < CANDIDATES; i++) {
     EmitterSample emitter = sample_emitter(sample_r3(key, index * CANDIDATES + i));
@@ -100,15 +100,20 @@ vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, 
     if (weight > 0.0 && choice * total < weight) {
       choice = choice * total / weight;
       best_irradiance = irradiance;
-      best_direction = direction;
-      best_distance = distance;
+      best_point = emitter.point;
       best_weight = weight;
     }
     else if (total > weight) {
       choice = (choice * total - weight) / (total - weight);
     }
   }
-  if (best_weight == 0.0 || trace_any(origin, best_direction, best_distance * 0.9999)) {
+  if (best_weight == 0.0) {
+    return vec3(0.0);
+  }
+  /* From where the ray starts, which is not `point`: to an emitter a few centimetres away it would be too long and meet the emitter itself. */
+  vec3 way = best_point - origin;
+  float way_length = max(length(way), 1.0e-20);
+  if (trace_any(origin, way / way_length, way_length * 0.9999)) {
     return vec3(0.0);
   }
   return best_irradiance * (total / (best_weight * float(CANDIDATES)));

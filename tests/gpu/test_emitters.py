@@ -43,23 +43,40 @@ def test_a_small_lamp_is_sampled_by_area_and_luminance():
     assert not sampling_density(furnace(0.5), grid()).any(), "what glows all over is left to the field"
 
 
-def test_light_of_a_small_lamp_on_the_floor():
-    """E = π L F of a parallel rectangle seen from the floor (Howell, B-4): four corners with sign."""
-    stages = Stages(room_with_panel(), grid((2, 1, 1)), BakeSettings(keep_all=True, face=32))
-    hits, irradiance = stages.hits(), stages.irradiance_at_texels(64).reshape(-1, 3)
-    points = hits[:, :3] + stages.grid.center
+def factor_of_panel(x, y, height):
+    """Form factor of the panel of ``room_with_panel`` from places x, y beneath or above it (Howell, B-4): four corners
+    with sign."""
 
-    def corner(width, depth, height=1.9):
+    def corner(width, depth):
         a, b = width / height, depth / height
         ra, rb = np.sqrt(1 + a * a), np.sqrt(1 + b * b)
         return (a / ra * np.arctan(b / ra) + b / rb * np.arctan(a / rb)) / (2 * np.pi)
 
+    return sum(corner(0.1 + sx * x, 0.05 + sy * y) for sx in (-1, 1) for sy in (-1, 1))
+
+
+def test_light_of_a_small_lamp_on_the_floor():
+    """E = π L F of a parallel rectangle seen from the floor."""
+    stages = Stages(room_with_panel(), grid((2, 1, 1)), BakeSettings(keep_all=True, face=32))
+    hits, irradiance = stages.hits(), stages.irradiance_at_texels(64).reshape(-1, 3)
+    points = hits[:, :3] + stages.grid.center
     on_floor = (hits[:, 3] >= 0) & (points[:, 2] < -0.999) & (np.abs(points[:, :2]).max(axis=1) < 2)
     assert on_floor.sum() > 500
-    x, y = points[on_floor, 0], points[on_floor, 1]
-    factor = sum(corner(0.1 + sx * x, 0.05 + sy * y) for sx in (-1, 1) for sy in (-1, 1))
+    factor = factor_of_panel(*points[on_floor, :2].T, 1.9)
     ratio = irradiance[on_floor] / (np.pi * factor[:, None] * RADIANCE)
     assert np.quantile(np.abs(ratio - 1), 0.95) < 0.03 and abs(ratio.mean() - 1) < 2e-3
+
+
+def test_light_of_a_lamp_on_the_ceiling_right_above_it():
+    """A hand's breadth and less from a surface a shadow ray, which starts a little off the surface, must not end in the
+    lamp itself: the ceiling here would get none of its light."""
+    stages = Stages(room_with_panel(height=0.97), grid((2, 1, 1)), BakeSettings(keep_all=True, face=32))
+    hits, irradiance = stages.hits(), stages.irradiance_at_texels(256).reshape(-1, 3)
+    points = hits[:, :3] + stages.grid.center
+    above = (hits[:, 3] >= 0) & (points[:, 2] > 0.999) & (np.abs(points[:, :2]).max(axis=1) < 0.3)
+    assert above.sum() > 30
+    expected = np.pi * factor_of_panel(*points[above, :2].T, 0.03)[:, None] * RADIANCE
+    np.testing.assert_allclose(irradiance[above].mean(axis=0), expected.mean(axis=0), rtol=0.03)
 
 
 def room_with_pictures():
