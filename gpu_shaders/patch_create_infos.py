@@ -54,7 +54,7 @@ def _pending(info, defines: dict, *names: str) -> int:
 def _due(info, *names: str) -> int:
     """The same for patch_due_lib."""
     _samplers(info, "spread", "lights", "mean_lights", *names)
-    _ints(info, "patch_count", "sample_class")
+    _ints(info, "patch_count")
     _image(info, 0, "classes", pixel="R32F", access="READ+WRITE")
     info.define("SHADOWED", repr(SHADOWED))
     info.define("DARK", repr(DARK))

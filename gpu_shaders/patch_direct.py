@@ -101,16 +101,18 @@ class PatchDirect:
     def _light_what_is_due(self, points: gpu.types.GPUTexture) -> Steps[None]:
         """Patches that were not lit, or with another number of samples than they should have."""
         lights = self._lights_together()
-        kinds = [(part, index) for part in self._parts for index in range(len(SAMPLES))]
-        counts = scratch(max(len(kinds), 1), "patches", "R32F")
-        lists = [
-            self._list_due(self._parts[part], lights, index, counts, row) for row, (part, index) in enumerate(kinds)
-        ]
-        for (part, index), due, count in zip(kinds, lists, read(counts, len(kinds), channels=1)[:, 0].astype(int)):
-            if count:
-                target = self._parts[part].values.texture
-                samples = SAMPLES[index] * self.effort
-                yield from self.light(points, POINTS, due, int(count), samples, target, part=part)
+        classes, parts = len(SAMPLES), list(self._parts.items())
+        counts = scratch(max(len(parts) * classes, 1), "patches", "R32F")
+        lists = [self._list_due(light, lights, counts, row * classes) for row, (_part, light) in enumerate(parts)]
+        lengths = read(counts, len(parts) * classes, channels=1).reshape(-1, classes).astype(int)
+        for (part, light), due, numbers in zip(parts, lists, lengths):
+            for index, number in enumerate(numbers):
+                if number:
+                    samples, first = SAMPLES[index] * self.effort, index * self.count
+                    target = light.values.texture
+                    yield from self.light(
+                        points, POINTS, due, int(number), samples, target, part=part, first_entry=first
+                    )
         self._add_up()
 
     def _lights_together(self) -> gpu.types.GPUTexture:
@@ -129,11 +131,12 @@ class PatchDirect:
         add_patches(lights, self.count, [light.spread.texture for light in parts])
         return lights
 
-    def _list_due(self, light: _PartLight, lights, index: int, counts, row: int) -> gpu.types.GPUTexture:
-        """Patches that ``light`` should light with SAMPLES[index] and has not yet, marked as lit so; their number goes
-        into element ``row`` of ``counts``."""
+    def _list_due(self, light: _PartLight, lights, counts, first: int) -> gpu.types.GPUTexture:
+        """Patches that ``light`` should light with each of SAMPLES and has not yet, marked as lit so: lists of
+        ``count`` elements one after the other. Their lengths go into elements of ``counts`` from ``first`` on."""
         blocks = max(-(-self.count // COMPACTION_BLOCK), 1)
-        block_counts, due = scratch(blocks, "patches", "R32F"), scratch(self.count, "patches", "R32F")
+        block_counts = scratch(blocks * len(SAMPLES), "patches", "R32F")
+        due = scratch(self.count * len(SAMPLES), "patches", "R32F")
         for name in ("compact_count_comp", "patch_due_comp"):
             shader = program(name, DUE=name == "compact_count_comp")
             shader.uniform_sampler("spread", light.spread.texture)
@@ -141,15 +144,14 @@ class PatchDirect:
             shader.uniform_sampler("mean_lights", self._mean_lights.texture)
             shader.image("classes", light.classes.texture)
             shader.uniform_int("patch_count", (self.count,))
-            shader.uniform_int("sample_class", (index,))
             if name == "compact_count_comp":
                 shader.image("block_counts", block_counts)
             else:
                 shader.uniform_sampler("block_counts", block_counts)
                 shader.image("due", due)
                 shader.image("due_counts", counts)
-                shader.uniform_int("result", (row,))
-            gpu.compute.dispatch(shader, blocks, 1, 1)
+                shader.uniform_int("result", (first,))
+            gpu.compute.dispatch(shader, blocks, len(SAMPLES), 1)
         return due
 
     def _add_up(self) -> None:
@@ -174,17 +176,26 @@ class PatchDirect:
     # ------------------------------------------------------------------------------------------------------------------
 
     def light(
-        self, points, points_each: int, chosen, count: int, samples: int, target, first_key: int = 0, part: Part = ALL
+        self,
+        points,
+        points_each: int,
+        chosen,
+        count: int,
+        samples: int,
+        target,
+        first_key: int = 0,
+        part: Part = ALL,
+        first_entry: int = 0,
     ) -> Steps[None]:
-        """Direct light by ``part`` of ``count`` patches or texels, whose numbers are in ``chosen``, with
-        ``points_each`` places in ``points``, into ``target``; in steps."""
+        """Direct light by ``part`` of ``count`` patches or texels, whose numbers are in ``chosen`` from ``first_entry``
+        on, with ``points_each`` places in ``points``, into ``target``; in steps."""
         for begins, portion in enumerate(self._portions(part)):
             lamps = portion[1] - portion[0] if isinstance(portion, tuple) else 1
             samples_each = max(1, _SAMPLES_EACH // lamps)
             at_once = max(1, _THREADS_AT_ONCE // -(-samples // samples_each))
 
             def light(start: int, number: int, portion=portion, samples_each=samples_each, begins=begins == 0) -> None:
-                some = (start, number)
+                some = (first_entry + start, number)
                 self._light_portion(
                     portion, points, points_each, chosen, some, samples, samples_each, target, first_key, begins
                 )

@@ -2,13 +2,19 @@
  * end) and which are picked.
  *
  * compact_count_comp counts per block of BLOCK entries, then a shader places what was picked: 256 threads a block, RUN entries one after the
- * other a thread.
+ * other a thread. Groups of one y make one list.
  */
 
 const int RUN = 16;
 const int BLOCK = 256 * RUN;
 
 SHARED_ int counts[256];
+
+/* Among the blocks of all lists. */
+int block_number(int block)
+{
+  return int(gl_WorkGroupID.y * gl_NumWorkGroups.x) + block;
+}
 
 /* How many of this thread's entries are selected, and how many of the block's before it; counts[255] is then the block's number. */
 ivec2 count_selected(int first)
@@ -32,13 +38,13 @@ ivec2 count_selected(int first)
 #ifdef PLACES
 SHARED_ int earlier[256];
 
-/* Sum of the counts of all blocks before `block`. */
+/* Sum of the counts of all blocks of this list before `block`. */
 int count_before(int block)
 {
   int lane = int(gl_LocalInvocationID.x);
   int sum = 0;
   for (int i = lane; i < block; i += 256) {
-    sum += int(element(block_counts, i).x);
+    sum += int(element(block_counts, block_number(i)).x);
   }
   earlier[lane] = sum;
   barrier();

@@ -1,5 +1,5 @@
-/* Patches that are due to be lit by a part of the light, see compaction_lib: those that should have number `sample_class` of samples and
- * have another one or none. How many they should have: core/patches.py, direct_samples.
+/* Patches that are due to be lit by a part of the light, see compaction_lib: those that should have another number of samples than they
+ * have, a list for each number. How many they should have: core/patches.py, direct_samples.
  *
  * spread: mean and standard deviation of one sample, if nothing stood between; lights and mean_lights: the mean that all parts send to the
  * patch and to all patches.
@@ -12,6 +12,7 @@ int item(int entry)
 
 bool is_selected(int patch_index)
 {
+  int sample_class = int(gl_WorkGroupID.y);
   if (patch_index < 0 || imageLoad(classes, element_position(patch_index)).x == float(sample_class)) {
     return false;
   }
