@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .cell_ranges import cells_of_boxes
 from .grid import Grid
 from .snapshot import SceneSnapshot
 from .triangles import bounds
@@ -172,17 +173,9 @@ def _near_pairs(
     first = np.maximum(np.ceil(lowest - margin), 0).astype(np.int64)
     last = np.minimum(np.floor(highest + margin), resolution - 1).astype(np.int64)
     near = np.flatnonzero((first <= last).all(axis=1))
-    spans = (last - first + 1)[near]
-    ends = np.cumsum(spans.prod(axis=1))
     found = [(np.zeros(0, np.int64), np.zeros(0, np.int64))]
-    for start in range(0, int(ends[-1]) if len(ends) else 0, _PAIRS_AT_ONCE):
-        pair = np.arange(start, min(start + _PAIRS_AT_ONCE, int(ends[-1])))
-        which = np.searchsorted(ends, pair, side="right")
-        rank = pair - (ends[which] - spans[which].prod(axis=1))
-        span, low = spans[which], first[near[which]]
-        i = low[:, 0] + rank % span[:, 0]
-        j = low[:, 1] + rank // span[:, 0] % span[:, 1]
-        k = low[:, 2] + rank // (span[:, 0] * span[:, 1])
+    for which, node in cells_of_boxes(first[near], last[near], _PAIRS_AT_ONCE):
+        i, j, k = node.T
         row, triangle = row_of[i + resolution[0] * (j + resolution[1] * k)], near[which]
         row, triangle = row[row >= 0], triangle[row >= 0]
         place = positions[row]

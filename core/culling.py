@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .cell_ranges import cells_of_boxes
 from .grid import Grid
 from .triangles import bounds
 
@@ -48,22 +49,12 @@ def occupied_cells(grid: Grid, local: np.ndarray, reach: float) -> np.ndarray:
     # A triangle that touches a cell's face belongs to the cells of both sides.
     first = np.clip(np.ceil(low) - 1, 0, cells - 1).astype(np.int64)
     last = np.clip(np.floor(high), 0, cells - 1).astype(np.int64)
-    spans = last - first + 1
-    pairs_per_triangle = spans.prod(axis=1)
-    single = pairs_per_triangle == 1
+    single = (first == last).all(axis=1)
     occupied[tuple(first[single].T)] = True
 
     many = np.flatnonzero(~single)
-    ends = np.cumsum(pairs_per_triangle[many])
-    total = int(ends[-1]) if len(many) else 0
-    for start in range(0, total, _PAIRS_AT_ONCE):
-        pair = np.arange(start, min(start + _PAIRS_AT_ONCE, total))
-        which = np.searchsorted(ends, pair, side="right")
+    for which, cell in cells_of_boxes(first[many], last[many], _PAIRS_AT_ONCE):
         triangle = many[which]
-        rank = pair - (ends[which] - pairs_per_triangle[triangle])
-        span = spans[triangle]
-        offset = np.stack([rank % span[:, 0], rank // span[:, 0] % span[:, 1], rank // (span[:, 0] * span[:, 1])], 1)
-        cell = first[triangle] + offset
         open_ = ~occupied[tuple(cell.T)]  # a cell found once needs no second test
         triangle, cell = triangle[open_], cell[open_]
         cell_low = np.where(cell == 0, -reach, cell)
