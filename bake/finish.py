@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..core import dilation, gradients
-from ..core.conventions import ACTIVE, CULLED, INVALID
+from ..core.conventions import ACTIVE, INVALID
 from ..core.errors import InputError
-from ..core.field import Field
+from ..core.field import Field, state_counts
 from ..core.grid import Grid
 from ..core.orientation import inside_solid
 from ..core.settings import BakeSettings
@@ -64,10 +64,7 @@ def complete(
     field.gradient = gradients.limited(grid, field.gradient, field.coefficients)
     if settings.deringing:
         result.notes.append(dering_field(field))
-    result.counts = {"total": grid.count} | {
-        name: int((states == value).sum())
-        for name, value in (("active", ACTIVE), ("culled", CULLED), ("invalid", INVALID))
-    }
+    result.counts = state_counts(states)
     if not np.isfinite(field.coefficients).all():
         raise InputError(
             f"scene '{scene_name}' sends light that is not finite; look for lights or emission beyond 1e30"

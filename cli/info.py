@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.conventions import ACTIVE, CULLED, INVALID, LUMINANCE
+from ..core.conventions import ACTIVE, LUMINANCE
+from ..core.field import state_counts
 from ..core.ringing import ringing
+from ..core.spherical_harmonics import Y0
 from ..formats import probe_file
 
 HELP = "what a probe file holds"
@@ -27,16 +29,11 @@ def summarise(field) -> dict:
     """What ``info`` says about ``field``, as plain values. Lengths in metres, radiance in scene units."""
     grid = field.grid
     active = field.state == ACTIVE
-    mean = field.coefficients[active, 0] @ LUMINANCE * 0.28209479177387814  # L00·Y00 is the mean radiance
+    mean = field.coefficients[active, 0] @ LUMINANCE * Y0
     corners = np.array([[x, y, z, 1.0] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) @ grid.matrix.T
     summary = {
         **field.metadata,
-        "probes": {
-            "total": grid.count,
-            "active": int(active.sum()),
-            "culled": int((field.state == CULLED).sum()),
-            "invalid": int((field.state == INVALID).sum()),
-        },
+        "probes": state_counts(field.state),
         "bounds": {"min": corners[:, :3].min(axis=0).tolist(), "max": corners[:, :3].max(axis=0).tolist()},
         "spacing": grid.cell_size().tolist(),
         "mean_radiance": None

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from .conventions import COSINE_LOBE
+from .conventions import COSINE_LOBE, bands_of
 
 
 def band_energy(coefficients: np.ndarray) -> np.ndarray:
     """(P, bands) mean square of irradiance over all normals and colours that each band contributes."""
-    bands = int(round(np.sqrt(coefficients.shape[1])))
+    bands = bands_of(coefficients.shape[1])
     squared = np.square(np.asarray(coefficients, float)).mean(axis=2) / (4 * np.pi)
     return np.stack([COSINE_LOBE[l] ** 2 * squared[:, l * l : (l + 1) ** 2].sum(axis=1) for l in range(bands)], axis=1)
 
@@ -45,7 +45,7 @@ def bands_needed(coefficients: np.ndarray, counted: np.ndarray, budget: float) -
 
 def without_upper_bands(coefficients: np.ndarray, needed: np.ndarray) -> np.ndarray:
     """``coefficients`` (P, K, …) with zeros from band ``needed`` (P,) on; also right for gradients with K there."""
-    bands = int(round(np.sqrt(coefficients.shape[1])))
+    bands = bands_of(coefficients.shape[1])
     band = np.repeat(np.arange(bands), 2 * np.arange(bands) + 1)
     kept = band[None] < needed[:, None]
     return np.where(kept.reshape(*kept.shape, *[1] * (coefficients.ndim - 2)), coefficients, 0).astype(

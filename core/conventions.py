@@ -50,6 +50,11 @@ def band_of(index: int) -> int:
     return int(np.floor(np.sqrt(index)))
 
 
+def bands_of(count: int) -> int:
+    """Bands of a series with ``count`` = bands² coefficients."""
+    return int(round(np.sqrt(count)))
+
+
 def coefficient_names(bands: int) -> list[str]:
     """Channel names in coefficient order: L00, L1m1, L10, L11, L2m2 …"""
     names = []

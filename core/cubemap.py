@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cubemap texels and the octahedral map: directions, exact solid angles, and their inverses.
 
-GLSL twin: gpu_shaders/cubemap_lib.glsl. The face layout is drawn in core/conventions.py.
+GLSL twin: gpu_shaders/glsl/cubemap_lib.glsl. The face layout is drawn in core/conventions.py.
 """
 
 from __future__ import annotations

@@ -21,9 +21,8 @@ from .snapshot import Light
 Visible = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """(origins (M, 3), unit directions (M, 3), distances (M,)) -> (M,) bool: nothing lies nearer than the distance."""
 
-_FULL_SPREAD = (
-    np.pi - 1e-4
-)  # radians; from here on an area light's grid is taken as absent, as Blender's slider ends at 180°
+# Radians; from here on an area light's grid is taken as absent, as Blender's slider ends at 180°.
+_FULL_SPREAD = np.pi - 1e-4
 _LEAST_HALF_SPREAD = 1e-3  # radians
 _LEAST_BLEND = 1e-6  # of a spot's soft edge, in cosine
 _SHADOW_END = 0.9999  # of the distance to the light: the light's own surface casts no shadow

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Emissive surfaces that are sampled like lights, because the grid cannot resolve them.
+"""Emissive surfaces that are sampled like lights, because rays at random would miss them.
 
-The field carries light of emissive surfaces from probe to probe as well as its cells are fine: a luminous ceiling is
-carried exactly, a lamp smaller than a cell is smeared over it, and a wall right beside the lamp gets a fraction of its
-light. Emitters smaller than a cell are therefore sampled: as lights at texel surfaces, and as extra directions in the
-probes themselves, where one ray per texel may miss them.
+Rays between patches and the texels of probes find a luminous ceiling often enough; of a lamp smaller than a cell they
+hit too little, or nothing. Emitters smaller than a cell are therefore sampled: as lights at patches, and as extra
+directions in the probes themselves, where one ray per texel may miss them.
 """
 
 from __future__ import annotations

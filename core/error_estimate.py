@@ -20,9 +20,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .conventions import ACTIVE, COSINE_LOBE, band_of
+from .conventions import ACTIVE
 from .field import Field
 from .gradients import per_cell
+from .spherical_harmonics import cosine_lobe
 
 _OF_DISAGREEMENT = 0.2
 _OF_SECOND_DIFFERENCE = 1.0 / 8.0
@@ -35,7 +36,7 @@ def interpolation_error(field: Field) -> np.ndarray:
     their neighbours' light and tell nothing.
     """
     nx, ny, nz = field.grid.resolution
-    lobe = np.array([COSINE_LOBE[band_of(i)] for i in range(field.coefficients.shape[1])])
+    lobe = cosine_lobe(field.bands)
     light = (field.coefficients * lobe[:, None]).reshape(nz, ny, nx, -1)
     active = (field.state == ACTIVE).reshape(nz, ny, nx)
     squared = np.zeros((nz, ny, nx))

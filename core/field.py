@@ -7,9 +7,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .conventions import ACTIVE, DEPTH_EDGE
+from .conventions import ACTIVE, CULLED, DEPTH_EDGE, INVALID, bands_of
 from .gradients import gradient_bands
 from .grid import Grid
+
+
+def state_counts(state: np.ndarray) -> dict[str, int]:
+    """Probes of ``state`` (P,) in all and by state."""
+    named = {"active": ACTIVE, "culled": CULLED, "invalid": INVALID}
+    return {"total": len(state)} | {name: int((state == value).sum()) for name, value in named.items()}
 
 
 @dataclass
@@ -39,7 +45,7 @@ class Field:
 
     @property
     def bands(self) -> int:
-        return int(round(np.sqrt(self.coefficients.shape[1])))
+        return bands_of(self.coefficients.shape[1])
 
     @classmethod
     def empty(cls, grid: Grid, bands: int) -> Field:

@@ -36,9 +36,7 @@ class InstancedHierarchy:
     meshes: list[Mesh]
     mesh_of: np.ndarray  # (N,) int
     to_mesh: np.ndarray  # (N, 3, 4) float64: mesh = M[:, :3] @ world + M[:, 3]
-    first_triangle: (
-        np.ndarray
-    )  # (N,) of each instance, counted as if all were flattened in order of meshes and matrices
+    first_triangle: np.ndarray  # (N,) of each instance, as if all were flattened in order of meshes and matrices
 
     @property
     def stack_size(self) -> int:

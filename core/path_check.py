@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import spherical_harmonics as sh
+from .conventions import bands_of
 
 NORMALS = np.concatenate([np.eye(3), -np.eye(3)])
 MOST_BANDS = 3  # that irradiance has
@@ -86,7 +87,7 @@ class PathCheck:
 
     def error_in_bands(self, coefficients: np.ndarray) -> SquaredError:
         """Of ``coefficients`` (K, bands², 3) where their bands can say it: the floor is not in it."""
-        bands = int(round(np.sqrt(coefficients.shape[1])))
+        bands = bands_of(coefficients.shape[1])
         measured = irradiance_of(coefficients, self._normals)
         first, second = self._in_bands(min(bands, MOST_BANDS))
         return self._product(measured - first, measured - second)

@@ -20,7 +20,8 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from .conventions import COSINE_LOBE, MAX_BANDS, band_of
+from .conventions import COSINE_LOBE, MAX_BANDS, band_of, bands_of
+from .spherical_harmonics import Y0, Y1, Y2_XX, Y2_ZZ, cosine_lobe
 
 _HALVINGS = 28  # of the dual's interval: the minimum is off by its square
 _GOLDEN = (np.sqrt(5) - 1) / 2
@@ -95,7 +96,7 @@ def dering(coefficients: np.ndarray) -> Window:
     for start in range(0, len(rings), _PROBES_AT_ONCE):
         part = rings[start : start + _PROBES_AT_ONCE]
         factors[part] = _least_damage(original[part], np.where(mean[part] > 0, -_ROUNDING * mean[part], -np.inf))
-    bands = int(round(np.sqrt(original.shape[1])))
+    bands = bands_of(original.shape[1])
     windowed = original * band_factors(factors, bands)[:, :, None]
     return Window(windowed.astype(np.asarray(coefficients).dtype), factors, _damage(original, windowed))
 
@@ -108,7 +109,7 @@ def _relative_minimum(coefficients: np.ndarray, mean: np.ndarray) -> np.ndarray:
 def _may_ring(coefficients: np.ndarray) -> np.ndarray:
     """(N,) bool: false where the norms of the bands leave no room for a negative direction. The least eigenvalue of a
     traceless symmetric M is not below −√⅔ |M|."""
-    first = np.sqrt((coefficients[:, 1:4] ** 2).sum(axis=1)) * (COSINE_LOBE[1] * 0.4886025119029199)
+    first = np.sqrt((coefficients[:, 1:4] ** 2).sum(axis=1)) * (COSINE_LOBE[1] * Y1)
     # a unit coefficient of the third band is a matrix of Frobenius norm ½ √(15/2π)
     second = np.sqrt((coefficients[:, 4:9] ** 2).sum(axis=1)) * (COSINE_LOBE[2] * np.sqrt(15 / (2 * np.pi)) / 2)
     return (_mean_irradiance(coefficients) < first + np.sqrt(2 / 3) * second).any(axis=1)
@@ -162,12 +163,12 @@ def _least_damage(coefficients: np.ndarray, limit: np.ndarray) -> np.ndarray:
 
 def _mean_irradiance(coefficients: np.ndarray) -> np.ndarray:
     """(N, 3) over all directions."""
-    return coefficients[:, 0] * (COSINE_LOBE[0] * 0.28209479177387814)
+    return coefficients[:, 0] * (COSINE_LOBE[0] * Y0)
 
 
 def _damage(before: np.ndarray, after: np.ndarray) -> float:
     """By Parseval: the integral of squared irradiance is the sum of its squared coefficients."""
-    lobe = np.array([COSINE_LOBE[band_of(index)] for index in range(before.shape[1])])[:, None]
+    lobe = cosine_lobe(bands_of(before.shape[1]))[:, None]
     scale = np.sqrt(np.sum((lobe * before) ** 2))
     return float(np.sqrt(np.sum((lobe * (after - before)) ** 2)) / scale) if scale > 0 else 0.0
 
@@ -186,15 +187,15 @@ class _Quadratic:
         values = np.zeros((count, MAX_BANDS**2, 3))
         values[:, : coefficients.shape[1]] = coefficients
         values = values.transpose(0, 2, 1)  # (N, channel, coefficient)
-        linear = 0.4886025119029199 * COSINE_LOBE[1] * values[..., [3, 1, 2]]
+        linear = Y1 * COSINE_LOBE[1] * values[..., [3, 1, 2]]
         xy, yz, zz, xz, xx = np.moveaxis(COSINE_LOBE[2] * values[..., 4:9], -1, 0)
         matrix = np.zeros((count, 3, 3, 3))
-        matrix[..., 0, 1] = matrix[..., 1, 0] = 0.5462742152960396 * xy
-        matrix[..., 1, 2] = matrix[..., 2, 1] = 0.5462742152960396 * yz
-        matrix[..., 0, 2] = matrix[..., 2, 0] = 0.5462742152960396 * xz
-        matrix[..., 0, 0] = 0.5462742152960396 * xx - 0.31539156525252005 * zz
-        matrix[..., 1, 1] = -0.5462742152960396 * xx - 0.31539156525252005 * zz
-        matrix[..., 2, 2] = 2 * 0.31539156525252005 * zz
+        matrix[..., 0, 1] = matrix[..., 1, 0] = Y2_XX * xy
+        matrix[..., 1, 2] = matrix[..., 2, 1] = Y2_XX * yz
+        matrix[..., 0, 2] = matrix[..., 2, 0] = Y2_XX * xz
+        matrix[..., 0, 0] = Y2_XX * xx - Y2_ZZ * zz
+        matrix[..., 1, 1] = -Y2_XX * xx - Y2_ZZ * zz
+        matrix[..., 2, 2] = 2 * Y2_ZZ * zz
         eigenvalues, vectors = np.linalg.eigh(matrix)
         return cls(_mean_irradiance(coefficients), np.einsum("ncij,nci->ncj", vectors, linear), eigenvalues)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .conventions import bands_of
 from .cubemap import texel_directions
 from .spherical_harmonics import basis
 
@@ -23,5 +24,5 @@ def rotation(matrix: np.ndarray, bands: int) -> np.ndarray:
 
 def rotate(coefficients: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     """``coefficients`` (…, bands², C) of the light as it is after space was turned by ``matrix`` (3, 3); float64."""
-    bands = int(round(np.sqrt(coefficients.shape[-2])))
+    bands = bands_of(coefficients.shape[-2])
     return np.einsum("kj,...jc->...kc", rotation(matrix, bands), coefficients, optimize=True)

@@ -28,9 +28,8 @@ class Image:
 
     name: str
     pixels: np.ndarray
-    extension: str = (
-        "REPEAT"  # REPEAT | EXTEND | CLIP | MIRROR, as in Blender's image texture node; ATLAS: never mipped
-    )
+    # REPEAT | EXTEND | CLIP | MIRROR, as in Blender's image texture node; ATLAS: never mipped
+    extension: str = "REPEAT"
 
 
 @dataclass(frozen=True)

@@ -3,31 +3,37 @@
 
 Sources: the basis as in Sloan, "Stupid Spherical Harmonics (SH) Tricks", GDC 2008, appendix A2, with the
 Condon-Shortley signs removed; the cosine lobe as in Ramamoorthi and Hanrahan, SIGGRAPH 2001, eq. 8.
-GLSL twin: gpu_shaders/spherical_harmonics_lib.glsl.
+GLSL twin: gpu_shaders/glsl/spherical_harmonics_lib.glsl.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from .conventions import COSINE_LOBE, band_of
+from .conventions import COSINE_LOBE, band_of, bands_of
+
+# Factors of the first nine functions, as polynomials: 1; y, z, x; xy, yz, 3z² − 1, xz, x² − y².
+Y0 = 0.28209479177387814  # √(1/4π): L00 · Y0 is the mean radiance
+Y1 = 0.4886025119029199  # √(3/4π)
+Y2_MIXED = 1.0925484305920792  # √(15/4π)
+Y2_ZZ = 0.31539156525252005  # √(5/16π)
+Y2_XX = 0.5462742152960396  # √(15/16π)
+POLYNOMIAL_FACTORS = np.array([Y0, Y1, Y1, Y1, Y2_MIXED, Y2_MIXED, Y2_ZZ, Y2_MIXED, Y2_XX])
 
 
 def basis(directions: np.ndarray, bands: int) -> np.ndarray:
     """Values of the first ``bands``² basis functions at unit ``directions`` (…, 3); returns (…, bands²)."""
     x, y, z = np.moveaxis(np.asarray(directions, float), -1, 0)
-    values = [np.full_like(x, 0.28209479177387814)]
+    values = [np.full_like(x, Y0)]
     if bands > 1:
-        c1 = 0.4886025119029199
-        values += [c1 * y, c1 * z, c1 * x]
+        values += [Y1 * y, Y1 * z, Y1 * x]
     if bands > 2:
-        c2 = 1.0925484305920792
         values += [
-            c2 * x * y,
-            c2 * y * z,
-            0.31539156525252005 * (3 * z * z - 1),
-            c2 * x * z,
-            0.5462742152960396 * (x * x - y * y),
+            Y2_MIXED * x * y,
+            Y2_MIXED * y * z,
+            Y2_ZZ * (3 * z * z - 1),
+            Y2_MIXED * x * z,
+            Y2_XX * (x * x - y * y),
         ]
     if bands > 3:
         c33, c31 = 0.5900435899266435, 0.4570457994644658
@@ -54,16 +60,14 @@ def basis_gradient(directions: np.ndarray, bands: int) -> np.ndarray:
     zero, one = np.zeros_like(x), np.ones_like(x)
     values = [(zero, zero, zero)]
     if bands > 1:
-        c1 = 0.4886025119029199
-        values += [(zero, c1 * one, zero), (zero, zero, c1 * one), (c1 * one, zero, zero)]
+        values += [(zero, Y1 * one, zero), (zero, zero, Y1 * one), (Y1 * one, zero, zero)]
     if bands > 2:
-        c2, c20, c22 = 1.0925484305920792, 0.31539156525252005, 0.5462742152960396
         values += [
-            (c2 * y, c2 * x, zero),
-            (zero, c2 * z, c2 * y),
-            (-2 * c20 * x, -2 * c20 * y, 4 * c20 * z),
-            (c2 * z, zero, c2 * x),
-            (2 * c22 * x, -2 * c22 * y, zero),
+            (Y2_MIXED * y, Y2_MIXED * x, zero),
+            (zero, Y2_MIXED * z, Y2_MIXED * y),
+            (-2 * Y2_ZZ * x, -2 * Y2_ZZ * y, 4 * Y2_ZZ * z),
+            (Y2_MIXED * z, zero, Y2_MIXED * x),
+            (2 * Y2_XX * x, -2 * Y2_XX * y, zero),
         ]
     polynomial = np.stack([np.stack(value, axis=-1) for value in values], axis=-2)
     degree = np.array([band_of(index) for index in range(bands * bands)])
@@ -90,7 +94,7 @@ def irradiance(coefficients: np.ndarray, normals: np.ndarray) -> np.ndarray:
     Leading shapes broadcast. The result may be negative where the series rings: callers decide whether to clamp.
     """
     coefficients = np.asarray(coefficients, float)
-    bands = int(round(np.sqrt(coefficients.shape[-2])))
+    bands = bands_of(coefficients.shape[-2])
     transfer = basis(normals, bands) * cosine_lobe(bands)
     return np.einsum("...k,...kc->...c", transfer, coefficients)
 
@@ -98,5 +102,5 @@ def irradiance(coefficients: np.ndarray, normals: np.ndarray) -> np.ndarray:
 def radiance(coefficients: np.ndarray, directions: np.ndarray) -> np.ndarray:
     """Band-limited radiance seen along unit ``directions`` (…, 3); shapes as in ``irradiance``."""
     coefficients = np.asarray(coefficients, float)
-    bands = int(round(np.sqrt(coefficients.shape[-2])))
+    bands = bands_of(coefficients.shape[-2])
     return np.einsum("...k,...kc->...c", basis(directions, bands), coefficients)

@@ -37,10 +37,6 @@ class Pace:
         self._wait = wait
         self._portion: dict[str, int] = {}  # items of a kind that take about a step
 
-    @property
-    def is_stepwise(self) -> bool:
-        return self._seconds is not None
-
     def portions(
         self, kind: str, count: int, work: Callable[[int, int], None], first: int = 16, at_once: int | None = None
     ) -> Steps[None]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..core.conventions import bands_of
 from ..core.errors import InputError
 from ..core.field import Field
 from ..core.gradients import per_cell
@@ -43,7 +44,7 @@ class Lattice:
 
     @property
     def bands(self) -> int:
-        return int(round(np.sqrt(self.coefficients.shape[1])))
+        return bands_of(self.coefficients.shape[1])
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.conventions import COSINE_LOBE
+from ..core.spherical_harmonics import POLYNOMIAL_FACTORS, cosine_lobe
 from .export_numbers import listing
 
 AXES, PRECISION, BANDS, SUFFIX = "unity", "float", 3, ".json"
@@ -28,12 +28,7 @@ DOES_NOT_CARRY = [
 ]
 _SCRIPT = Path(__file__).parent / "unity" / "GridlightProbeImporter.cs"
 
-# Constants of the nine basis functions, as polynomials in the form above.
-BASIS_CONSTANTS = np.array(
-    [0.28209479177387814] + [0.4886025119029199] * 3 + [1.0925484305920792] * 2
-    + [0.31539156525252005, 1.0925484305920792, 0.5462742152960396]
-)  # fmt: skip
-SCALE = BASIS_CONSTANTS * COSINE_LOBE[[0, 1, 1, 1, 2, 2, 2, 2, 2]] / np.pi
+SCALE = POLYNOMIAL_FACTORS * cosine_lobe(3) / np.pi
 
 
 def write(job) -> dict:

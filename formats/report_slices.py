@@ -17,7 +17,7 @@ import numpy as np
 
 from ..core.conventions import ACTIVE, CULLED, INVALID, LUMINANCE
 from ..core.field import Field
-from ..core.spherical_harmonics import irradiance
+from ..core.spherical_harmonics import Y0, irradiance
 from .report_figures import number
 
 INVALID_COLOUR = (214, 48, 90)
@@ -57,7 +57,7 @@ class Quantity:
 def quantities(field: Field) -> list[Quantity]:
     """What the report shows of ``field``."""
     up = np.maximum(irradiance(field.coefficients, np.array([0.0, 0.0, 1.0])), 0)
-    mean = field.coefficients[:, 0] * 0.28209479177387814  # L00·Y00, because Y00² is 1/4π
+    mean = field.coefficients[:, 0] * Y0
     return [
         Quantity("up", "Irradiance of a surface that faces up", "W/m²", values=up @ LUMINANCE),
         Quantity("mean", "Mean radiance from all sides", "W/(m² sr)", values=mean @ LUMINANCE),

@@ -14,7 +14,8 @@ from .programs import program
 from .scene_textures import SceneTextures
 from .textures import read, upload
 from .viewport_field import NO_FIELD, FieldTextures
-from .viewport_shading import BACKGROUND_FACE, Shading, background_texture, view_block
+from .viewport_shading import BACKGROUND_FACE, Shading, view_block
+from .world_light import world_texture
 
 _MOST_SPHERES = 2048  # per picture, nearest to the camera first
 _SPHERE_SHARE = 0.08  # of a cell's shortest edge
@@ -28,7 +29,7 @@ class PreviewPass:
         self._scene = scene
         self._origin = origin
         self._field = FieldTextures(field, origin) if field else None
-        self._background = background_texture(snapshot.world)
+        self._background = world_texture(snapshot.world, BACKGROUND_FACE)
 
     def render(
         self,

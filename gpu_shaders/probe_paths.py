@@ -7,12 +7,12 @@ import numpy as np
 
 from ..core.grid import Grid
 from ..core.snapshot import SceneSnapshot
-from ..core.world_map import world_texels
 from ..core.world_suns import extract_suns
 from .dispatch import dispatch_linear
 from .programs import program
 from .scene_textures import SceneTextures
 from .textures import allocate, read, upload
+from .world_light import world_texture
 
 _FACE = 32  # of the world as paths see it, without its suns
 _PARTS = 3  # samples a path writes: itself, a point on an emitter, a place on a sun
@@ -29,9 +29,7 @@ class ProbePaths:
         rows[:, :3] = positions - grid.center
         self.count = len(positions)
         self._points = upload(rows, "probes")
-        background = np.zeros((6 * _FACE**2, 4), np.float32)
-        background[:, :3] = world_texels(extract_suns(snapshot.world)[0], _FACE).reshape(-1, 3)
-        self._world = upload(background, "texels")
+        self._world = world_texture(extract_suns(snapshot.world)[0], _FACE)
 
     def trace(
         self, first: int, count: int, bounces: int | None, seed: int

@@ -5,32 +5,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import gpu
 
 from ..core.errors import NoGpuError
-from . import (
-    create_infos,
-    live_create_infos,
-    measure_create_infos,
-    patch_create_infos,
-    reference_create_infos,
-    relight_create_infos,
-    viewport_create_infos,
-)
 
-_GLSL = Path(__file__).parent / "glsl"
-_BINDINGS = (
-    create_infos,
-    live_create_infos,
-    measure_create_infos,
-    patch_create_infos,
-    reference_create_infos,
-    relight_create_infos,
-    viewport_create_infos,
-)
+_FOLDER = Path(__file__).parent
+_GLSL = _FOLDER / "glsl"
+_BINDINGS = [import_module(f".{path.stem}", __package__) for path in sorted(_FOLDER.glob("*create_infos.py"))]
 
 # Never emptied: in Blender 4.5 and 5.0 the address of a freed shader can be reused, and the old program then runs
 # silently.

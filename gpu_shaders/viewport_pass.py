@@ -22,7 +22,8 @@ from .programs import program
 from .scene_textures import SceneTextures
 from .textures import read, upload
 from .viewport_field import NO_FIELD, FieldTextures
-from .viewport_shading import BACKGROUND_FACE, Shading, background_texture, uniform_block, view_block
+from .viewport_shading import BACKGROUND_FACE, Shading, uniform_block, view_block
+from .world_light import world_texture
 
 CLUSTER_SIZE = 64  # triangles an instance
 MOST_SPHERES = 4096  # drawn of each volume, nearest to the eye first
@@ -105,7 +106,7 @@ class ViewportPass:
 
     def set_world(self, world: World) -> None:
         self.world_shines = world.map is not None or any(world.color)
-        self._background = background_texture(world)
+        self._background = world_texture(world, BACKGROUND_FACE)
 
     def set_fields(self, fields: list[FieldTextures]) -> None:
         """The volumes' fields, MOST_VOLUMES at most; they must share the scene's origin. Where boxes overlap, the

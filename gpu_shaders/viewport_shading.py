@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What pictures show, as the block that viewport_shade_lib.glsl reads, and the world behind the scene."""
+"""What pictures show and from where, as the blocks that viewport_shade_lib.glsl and viewport_surface_vert.glsl read."""
 
 from __future__ import annotations
 
@@ -8,10 +8,7 @@ from dataclasses import dataclass
 import gpu
 import numpy as np
 
-from ..core.snapshot import World
 from ..core.view import View
-from ..core.world_map import world_texels
-from .textures import upload
 
 MODES = ("FULL", "DIRECT", "INDIRECT", "IRRADIANCE", "NORMALS", "VALIDITY", "ERROR")
 PROBE_SHADINGS = ("IRRADIANCE", "RADIANCE")
@@ -65,10 +62,3 @@ def view_block(view: View, height: int, jitter: tuple[float, float] = (0.0, 0.0)
 def uniform_block(rows: np.ndarray) -> gpu.types.GPUUniformBuf:
     """Uniform buffer of ``rows`` (N, 4) float32."""
     return gpu.types.GPUUniformBuf(gpu.types.Buffer("FLOAT", rows.size, np.ascontiguousarray(rows).reshape(-1)))
-
-
-def background_texture(world: World) -> gpu.types.GPUTexture:
-    """The world as ``world_texels`` with BACKGROUND_FACE texels along a face's edge."""
-    rows = np.zeros((6 * BACKGROUND_FACE**2, 4), np.float32)
-    rows[:, :3] = world_texels(world, BACKGROUND_FACE).reshape(-1, 3)
-    return upload(rows, "texels")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The world as a bake reads it: texels of a cube's faces, whole for probes, without its suns for patches."""
+"""The world as shaders read it, texels of a cube's faces: for bakes whole to probes and without its suns to patches."""
 
 from __future__ import annotations
 
@@ -25,12 +25,13 @@ def send_world(scene: SceneTextures, world: World, face: int) -> tuple[gpu.types
     if known is None or known[0] is not world or known[1] != face:
         rest, suns = extract_suns(world)
         scene.set_suns(suns)
-        whole = _background(world, face)
-        known = _known[scene] = world, face, whole, _background(rest, face) if suns else whole
+        whole = world_texture(world, face)
+        known = _known[scene] = world, face, whole, world_texture(rest, face) if suns else whole
     return known[2], known[3]
 
 
-def _background(world: World, face: int) -> gpu.types.GPUTexture:
-    background = np.zeros((6 * face**2, 4), np.float32)
-    background[:, :3] = world_texels(world, face).reshape(-1, 3)
-    return upload(background, "texels")
+def world_texture(world: World, face: int) -> gpu.types.GPUTexture:
+    """Radiance of ``world`` as ``world_texels``: faces of ``face``² texels one after the other, an element a texel."""
+    rows = np.zeros((6 * face**2, 4), np.float32)
+    rows[:, :3] = world_texels(world, face).reshape(-1, 3)
+    return upload(rows, "texels")

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Multiplies and adds: ``rounds`` × 4 independent vec4 per thread, 32 operations each round, one store at the end.
-// Dispatched as (width / 16, height / 16, 1). ``factor`` must be unknown to the compiler.
+/* How fast the device multiplies and adds: 4 independent vec4 a thread, 32 operations each of `rounds`, one store at the end.
+ *
+ * Dispatch: one thread a texel; groups of 16×16. `factor` must be unknown to the compiler.
+ */
 
 void main()
 {

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Copies an image, one thread a texel: 32 bytes move per thread. Dispatched as (width / 16, height / 16, 1).
+/* How fast the device moves memory: copies an image, 32 bytes a thread.
+ *
+ * Dispatch: one thread a texel; groups of 16×16.
+ */
 
 void main()
 {

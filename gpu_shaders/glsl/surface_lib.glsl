@@ -99,7 +99,7 @@ struct Surface {
   int object;
   vec3 albedo;
   vec3 emission;
-  float emitter_density; /* per m²; 0 where the emission is carried by the field */
+  float emitter_density; /* per m²; 0 where rays find the emission by themselves */
 };
 
 /* Where a ray meets a triangle's plane, near the `interpolated` hit. Interpolation is off by the rounding of the corners, centimetres on a

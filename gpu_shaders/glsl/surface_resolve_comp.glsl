@@ -4,7 +4,8 @@
  * first_layer + probe of:
  *   geometry  octahedral normal, signed distance (negative: back face; NO_SURFACE: background), triangle
  *   albedo    diffuse albedo; texel_patches_comp later adds the patch
- *   emission  emitted radiance, density where it is sampled as a light, 0 where the field carries it; the world's radiance where the texel sees background
+ *   emission  emitted radiance, density where it is sampled as a light, 0 where it is not; the world's radiance where the texel sees
+ *             background
  */
 
 void main()
