@@ -41,8 +41,7 @@ class Convergence:
 
     def add(self, energy: float, change: float, overlap: float) -> float:
         """Takes |field|², |change|² and change · last change of one iteration. Returns the factor to extrapolate by, 0
-        for none,
-        MANY_MODES where the last STATES states are to tell.
+        for none, MANY_MODES where the last STATES states are to tell.
 
         The first iteration is direct light and may be dark: what glows and the world arrive with the first bounce.
         Each further one is a bounce.

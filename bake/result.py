@@ -84,10 +84,15 @@ class BakeResult:
     error: dict | None = None  # then: target, predicted error and its parts, see error_driven.py
 
 
+def check_surfaces(snapshot: SceneSnapshot) -> None:
+    """Raises InputError for a scene without surface."""
+    if not len(snapshot.triangles):
+        raise InputError(f"scene '{snapshot.name}' has no surface that renders; add a mesh or enable one for rendering")
+
+
 def check_scene(snapshot: SceneSnapshot, result: BakeResult) -> None:
     """Refuses scenes without surface, warns of those without light."""
-    if not len(snapshot.triangles):
-        raise InputError(f"scene '{snapshot.name}' has no surface that renders; add or unhide a mesh")
+    check_surfaces(snapshot)
     emits = any(any(m.emission) for m in snapshot.materials)
     world = snapshot.world.map is not None or any(snapshot.world.color)
     if not (snapshot.lights or emits or world):

@@ -9,40 +9,6 @@ import re
 
 from ..core.errors import InputError
 
-# Options whose values may start with a minus sign, which argparse would take for another option.
-SIGNED_OPTIONS = (
-    "--min",
-    "--max",
-    "--spacing",
-    "--seed",
-    "--frame",
-    "--tolerance",
-    "--error",
-    "--bounces",
-    "--gather",
-    "--samples",
-    "--bands",
-    "--face",
-    "--memory",
-    "--block",
-    "--frames",
-    "--shards",
-    "--shard",
-    "--iteration",
-    "--workers",
-    "--timeout",
-    "--resolution",
-    "--points",
-    "--spp",
-    "--height",
-    "--axes",
-    "--scale",
-    "--gain",
-    "--probe",
-    "--size",
-    "--refine",
-)
-
 
 class Given(argparse.Action):
     """Stores an option's value and notes in ``namespace.given``, a set of names, that it was given."""
@@ -63,28 +29,27 @@ class Parser(argparse.ArgumentParser):
 
 
 def join_signed_values(argv: list[str]) -> list[str]:
-    """``argv`` with ``--min -1,-2,0`` written as ``--min=-1,-2,0``, which argparse reads as meant."""
+    """``argv`` with ``--min -1,-2,0`` written as ``--min=-1,-2,0``: argparse takes what begins with a minus sign for
+    another option."""
     joined: list[str] = []
-    words = iter(argv)
-    for word in words:
+    for index, word in enumerate(argv):
         if word == "--":
-            return [*joined, word, *words]
-        if word in SIGNED_OPTIONS:
-            value = next(words, None)
-            if value is None:
-                joined.append(word)
-            elif value.startswith("-") and (_is_number(value) or word == "--axes"):
-                joined.append(f"{word}={value}")
-            else:
-                joined += [word, value]
+            return [*joined, *argv[index:]]
+        before = argv[index - 1] if index else ""
+        if before.startswith("--") and "=" not in before and word.startswith("-") and _is_value(word):
+            joined[-1] += f"={word}"
         else:
             joined.append(word)
     return joined
 
 
-def _is_number(text: str) -> bool:
+def _is_value(word: str) -> bool:
+    """Is it a number, or several, or axes like -x,z,y, or a range of frames?"""
+    first = word.split(",")[0]
+    if first[1:].lower() in ("x", "y", "z") or re.fullmatch(r"-\d+--?\d+", word):
+        return True
     try:
-        float(text.split(",")[0])
+        float(first)
     except ValueError:
         return False
     return True

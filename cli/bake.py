@@ -198,13 +198,13 @@ def run(args, reporter, should_stop):
     from . import pipeline
     from .relighting import relight_all
     from .result_files import NOT_CONVERGED
-    from .stopwatch import Stopwatch
+    from .run_clock import RunClock
 
     check(args)
     settings = settings_from(args)
-    stopwatch = Stopwatch()
+    stopwatch = RunClock()
     with StagedFolder(args.output) as folder:
-        with stopwatch.measure("read"):
+        with stopwatch("read"):
             reporter.phase("read")
             scene = bpy.context.scene if args.file is None else open_blend(args.file)
             if args.frame is not None:

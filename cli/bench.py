@@ -18,7 +18,6 @@ from . import bake, bench_run
 HELP = "measures speed against error, peers side by side"
 NEEDS_BLENDER = NEEDS_GPU = False  # this process only starts others, which have both
 
-
 DEFAULT = "peers"
 # name -> (what it measures, seconds that it may take unless --limit says something else)
 BENCHMARKS = {

@@ -12,7 +12,7 @@ from ..scene.read import read_scene
 from . import bench_scenes, pipeline
 from .bench_measure import report
 from .bench_measure_peers import load_scene
-from .stopwatch import Stopwatch
+from .run_clock import RunClock
 from .verify_points import SIX_NORMALS
 
 _EEVEE_VALUES = 4 * 3  # that EEVEE keeps per probe, at least: two bands of RGB as 32-bit floats
@@ -28,10 +28,10 @@ def eevee(request: dict, reporter, should_stop) -> None:
     for run in ("cold", "warm"):
         if should_stop():
             raise Cancelled("cancelled")
-        stopwatch = Stopwatch()
+        stopwatch = RunClock()
         pipeline.start_gpu(reporter, stopwatch)
         reporter.phase(f"EEVEE volume bake ({run}); it does not say how far it is")
-        with stopwatch.measure("light"):
+        with stopwatch("light"):
             done = bpy.ops.object.lightprobe_cache_bake(subset="ALL")
         seconds = stopwatch.totals()
         # The operator also finishes where it has given up, so what it is timed for has to be there.

@@ -32,7 +32,7 @@ from ..scene.read import read_scene
 from . import bench_scenes, pipeline
 from .bench_measure import report
 from .result_files import NOT_CONVERGED
-from .stopwatch import Stopwatch
+from .run_clock import RunClock
 from .verify_points import SIX_NORMALS, FreeSpace
 
 _MOST_WARM, _WARM_SECONDS = 15, 1.5  # warm bakes, until one of the two is reached
@@ -103,9 +103,9 @@ class _Baked:
 
 
 def _bake_once(scene, name: str, settings: BakeSettings, run: str, reporter, should_stop) -> _Baked:
-    stopwatch = Stopwatch()
+    stopwatch = RunClock()
     pipeline.start_gpu(reporter, stopwatch)
-    with stopwatch.measure("read"):
+    with stopwatch("read"):
         reporter.phase(f"read ({run})")
         snapshot = read_scene(scene)
     grid = bench_scenes.grid_of(name, snapshot)

@@ -10,8 +10,8 @@ from ..core.errors import InputError
 from . import bench_plot, bench_table
 from .bench_run import Run
 
-# (width, height, samples) of the Cycles panoramas. The first is the cheapest that is accurate.
 GALLERY = "gallery"  # a name of bench_scenes, which only processes with Blender can import
+# (width, height, samples) of the Cycles panoramas. The first is the cheapest that is accurate.
 CYCLES_SETTINGS = ((64, 32, 8), (32, 16, 8), (128, 64, 8))
 
 

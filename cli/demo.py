@@ -31,16 +31,16 @@ def run(args, reporter, should_stop):
     from ..scene.probe_objects import place_probes
     from ..scene.read import read_scene
     from . import pipeline
-    from .stopwatch import Stopwatch
+    from .run_clock import RunClock
 
     settings = bake.settings_from(args)
-    stopwatch = Stopwatch()
+    stopwatch = RunClock()
     with StagedFolder(args.output) as folder:
-        with stopwatch.measure("setup"):
+        with stopwatch("setup"):
             reporter.phase("build")
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
             scene = build_gallery(bpy.context.scene)
-        with stopwatch.measure("read"):
+        with stopwatch("read"):
             reporter.phase("read")
             snapshot = read_scene(scene)
         pipeline.check_snapshot(snapshot, reporter)
@@ -49,7 +49,7 @@ def run(args, reporter, should_stop):
         results = pipeline.bake_volumes(
             snapshot, grids, settings, reporter, should_stop, stopwatch, goal=bake.goal_from(args)
         )
-        with stopwatch.measure("write"):
+        with stopwatch("write"):
             for volume, result in zip(snapshot.volumes, results):
                 place_probes(scene, result.field.grid, result.field.state, bpy.data.objects.get(volume.name))
             blend = folder.path("gallery.blend").absolute()

@@ -11,9 +11,8 @@ from ..bake.block_session import AnySession, open_session
 from ..bake.error_driven import ErrorDrivenBake
 from ..bake.job import drive
 from ..bake.preview import write_previews
-from ..bake.result import BakeResult, report_on
+from ..bake.result import BakeResult, check_surfaces, report_on
 from ..core.error_budget import ErrorGoal
-from ..core.errors import InputError
 from ..core.grid import Grid
 from ..core.probe_edits import ProbeEdits
 from ..core.settings import BakeSettings
@@ -23,21 +22,20 @@ from ..formats.staging import StagedFolder
 from ..gpu_shaders.context import device_description, ensure_context
 from . import result_files, worker
 from .result_files import Origin
-from .stopwatch import Stopwatch
+from .run_clock import RunClock
 
 
-def start_gpu(reporter, stopwatch: Stopwatch) -> None:
+def start_gpu(reporter, stopwatch: RunClock) -> None:
     """Makes the GPU context and says so to the parent process."""
     reporter.phase("GPU context")
-    with stopwatch.measure("setup"):
+    with stopwatch("setup"):
         ensure_context()
     worker.milestone(worker.CONTEXT_READY)
 
 
 def check_snapshot(snapshot: SceneSnapshot, reporter) -> None:
     """Refuses a scene without surfaces and passes on what the reader warns of."""
-    if not len(snapshot.triangles):
-        raise InputError(f"scene '{snapshot.name}' has no surface that renders; add a mesh or enable one for rendering")
+    check_surfaces(snapshot)
     for warning in snapshot.warnings:
         reporter.warn(warning)
 
@@ -48,7 +46,7 @@ def bake_volumes(
     settings: BakeSettings,
     reporter,
     should_stop,
-    stopwatch: Stopwatch,
+    stopwatch: RunClock,
     edits: list[ProbeEdits | None] | None = None,
     kept: list[AnySession] | None = None,
     goal: ErrorGoal | None = None,
@@ -85,7 +83,7 @@ def write_results(
     folder: StagedFolder,
     reporter,
     should_stop,
-    stopwatch: Stopwatch,
+    stopwatch: RunClock,
     pictures: bool = True,
 ) -> tuple[dict, int]:
     """Stages all files of a bake of ``snapshot`` in ``folder``. Returns (summary, exit status)."""

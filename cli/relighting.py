@@ -19,7 +19,7 @@ from ..scene.open_file import open_blend, set_frame
 from ..scene.read import read_scene
 from . import pipeline
 from .bake import is_frame
-from .stopwatch import Stopwatch
+from .run_clock import RunClock
 
 
 def read_state(state: str, args) -> SceneSnapshot:
@@ -39,7 +39,7 @@ def relight_all(
     folder: StagedFolder,
     reporter,
     should_stop,
-    stopwatch: Stopwatch,
+    stopwatch: RunClock,
 ) -> tuple[list[dict], bool]:
     """Relights ``sessions`` for each of ``args.relight`` in order and stages their probe files.
 
@@ -48,7 +48,7 @@ def relight_all(
     entries, settled = [], True
     endings = volume_endings([session.grid.name for session in sessions])
     for number, state in enumerate(args.relight, 1):
-        with stopwatch.measure("read"):
+        with stopwatch("read"):
             reporter.phase("read")
             snapshot = read_state(state, args)
         pipeline.check_snapshot(snapshot, reporter)
@@ -57,7 +57,7 @@ def relight_all(
             result = session.result
             stopwatch.add(result.seconds)
             settled &= report_on(result, session.grid, session.settings, reporter)
-            with stopwatch.measure("write"):
+            with stopwatch("write"):
                 result.field.metadata = probe_metadata.provenance(
                     snapshot,
                     session.settings,

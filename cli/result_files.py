@@ -11,14 +11,15 @@ from pathlib import Path
 import numpy as np
 
 from ..bake.result import BakeResult, is_unsettled
-from ..core.conventions import ACTIVE, CULLED, INVALID
+from ..core.conventions import ACTIVE
+from ..core.field import state_counts
 from ..core.ringing import ringing
 from ..core.settings import BakeSettings
 from ..formats import probe_file, probe_metadata
 from ..formats.file_names import volume_endings
 from ..formats.report import ReportData, VolumeReport, write_report
 from ..formats.staging import StagedFolder
-from .stopwatch import Stopwatch
+from .run_clock import RunClock
 
 NOT_CONVERGED = 4  # the exit status where light has not settled that should have
 
@@ -44,13 +45,13 @@ def write_results(
     results: list[BakeResult],
     folder: StagedFolder,
     reporter,
-    stopwatch: Stopwatch,
+    stopwatch: RunClock,
     draw: Draw | None,
 ) -> tuple[dict, int]:
     """Stages probe files, pictures where they are drawn, and report in ``folder``. Returns (summary, exit status)."""
     names = volume_endings([result.field.grid.name for result in results])
     images = []
-    with stopwatch.measure("write"):
+    with stopwatch("write"):
         reporter.phase("write")
         for name, result in zip(names, results):
             result.field.metadata = {
@@ -110,18 +111,13 @@ def write_results(
     return summary, NOT_CONVERGED if any(is_unsettled(result, settings) for result in results) else 0
 
 
-def _summary(results, device: str, settings: BakeSettings, stopwatch: Stopwatch, reporter) -> dict:
+def _summary(results, device: str, settings: BakeSettings, stopwatch: RunClock, reporter) -> dict:
     states = np.concatenate([result.field.state for result in results])
     lit = np.concatenate([result.field.coefficients[result.field.state == ACTIVE] for result in results])
     chosen = [result.settings or settings for result in results]
     return {
         **({"error": _worst_error(results)} if any(result.error for result in results) else {}),
-        "probes": {
-            "total": len(states),
-            "active": int((states == ACTIVE).sum()),
-            "culled": int((states == CULLED).sum()),
-            "invalid": int((states == INVALID).sum()),
-        },
+        "probes": state_counts(states),
         "iterations": max(result.iterations for result in results),
         "converged": all(result.converged for result in results),
         "ringing": ringing(lit).as_dict(),

@@ -55,9 +55,9 @@ def run(args, reporter, should_stop):
         return {"merged": len(job.groups)}, 0
     if args.pictures:
         from ..cli import pipeline
-        from ..cli.stopwatch import Stopwatch
+        from ..cli.run_clock import RunClock
 
-        pipeline.start_gpu(reporter, Stopwatch())
+        pipeline.start_gpu(reporter, RunClock())
     files, entries, status = [], [], 0
     reporter.phase("merge", len(job.groups))
     for number in range(len(job.plan["frames"])):

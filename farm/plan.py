@@ -49,7 +49,7 @@ def run(args, reporter, should_stop):
     import bpy
 
     from ..cli import pipeline
-    from ..cli.stopwatch import Stopwatch
+    from ..cli.run_clock import RunClock
     from ..core.errors import Cancelled
     from ..gpu_shaders.context import device_description
     from ..scene.open_file import open_blend, set_frame
@@ -58,7 +58,7 @@ def run(args, reporter, should_stop):
     check(args)
     settings = bake.settings_from(args)
     job = Path(args.output)
-    stopwatch = Stopwatch()
+    stopwatch = RunClock()
     reporter.phase("read")
     scene = open_blend(args.file)
     pipeline.start_gpu(reporter, stopwatch)

@@ -10,7 +10,7 @@ from ..bake.finish import complete, tell
 from ..bake.result import BakeResult, report_on
 from ..cli.progress import Reporter
 from ..cli.result_files import Draw, Origin, write_results
-from ..cli.stopwatch import Stopwatch
+from ..cli.run_clock import RunClock
 from ..formats.staging import StagedFolder
 from .job import Job, Shard
 from .outcomes import read_outcomes
@@ -60,7 +60,7 @@ def merge_frame(
         job.plan["device"],
         job.plan["blender"],
     )
-    stopwatch = Stopwatch()
+    stopwatch = RunClock()
     stopwatch.add(_worker_seconds(job, number))
     draw = _drawing(job, frame, should_stop) if args.pictures else None
     with StagedFolder(folder) as staged:

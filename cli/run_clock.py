@@ -4,30 +4,25 @@
 from __future__ import annotations
 
 import time
-from contextlib import contextmanager
+
+from ..bake.stopwatch import Stopwatch
 
 PHASES = ("setup", "read", "cull", "capture", "light", "write", "total")
 
 
-class Stopwatch:
-    """``seconds`` by phase. The total is the time since it was made."""
+class RunClock(Stopwatch):
+    """Seconds by phase; the total is the time since the clock was made."""
 
     def __init__(self):
-        self.seconds = dict.fromkeys(PHASES, 0.0)
+        super().__init__(dict.fromkeys(PHASES, 0.0))
         self._started = time.perf_counter()
 
-    @contextmanager
-    def measure(self, phase: str):
-        started = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[phase] += time.perf_counter() - started
-
-    def add(self, seconds: dict) -> None:
+    def add(self, seconds: dict[str, float]) -> None:
+        """Adds what a bake or relight took, by phase."""
         for phase, value in seconds.items():
             self.seconds[phase] += value
 
-    def totals(self) -> dict:
+    def totals(self) -> dict[str, float]:
+        """Seconds by phase so far, to the microsecond, and their "total" by the wall."""
         self.seconds["total"] = time.perf_counter() - self._started
         return {phase: round(self.seconds[phase], 6) for phase in PHASES}
