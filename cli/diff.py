@@ -12,6 +12,8 @@ from ..formats import probe_file
 HELP = "how far two probe files of the same grid are apart"
 NEEDS_BLENDER = NEEDS_GPU = False
 
+_ARRAYS = ("coefficients", "state", "validity", "offset", "depth", "gradient")  # of a field: all that a lookup reads
+
 
 def add_arguments(parser, in_blender: bool) -> None:
     parser.add_argument("first", metavar="A.exr")
@@ -29,7 +31,8 @@ def compare(first, second) -> dict:
     """Differences of two fields of one grid over the probes that are active in both.
 
     Per band the root mean square of the coefficients' difference, absolute and relative to that of ``first`` (None
-    where that is zero). Where the number of bands differs, the missing ones count as zero.
+    where that is zero). Where the number of bands differs, the missing ones count as zero. "identical" is about
+    everything that a lookup reads, of all probes.
 
     Raises:
         InputError: the grids are not the same.
@@ -63,12 +66,7 @@ def compare(first, second) -> dict:
         }
     scale = _rms(values[0])
     return {
-        "identical": bool(
-            first.bands == second.bands
-            and np.array_equal(first.coefficients, second.coefficients)
-            and np.array_equal(first.state, second.state)
-            and np.array_equal(first.gradient, second.gradient)
-        ),
+        "identical": all(np.array_equal(getattr(first, name), getattr(second, name)) for name in _ARRAYS),
         "compared": int(both.sum()),
         "states_differ": int((first.state != second.state).sum()),
         "rms": _rms(difference),

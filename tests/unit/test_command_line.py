@@ -170,6 +170,17 @@ def test_diff_finds_the_probe_that_changed(run_gridlight, constant_file, tmp_pat
     assert summary["bands"][1] == {"band": 1, "rms": 0.0, "relative": None}
 
 
+@pytest.mark.parametrize("what", ["validity", "offset", "depth"])
+def test_files_that_differ_in_what_a_lookup_reads_are_not_identical(run_gridlight, constant_file, tmp_path, what):
+    """It was said of files with other offsets and depths, which light surfaces differently."""
+    field = probe_file.read(constant_file)
+    getattr(field, what).flat[5] += 0.25
+    other = tmp_path / "other.exr"
+    probe_file.write(other, field)
+    summary = last_json(run_gridlight("diff", constant_file, other))
+    assert not summary["identical"] and summary["rms"] == 0
+
+
 def test_diff_of_different_grids_is_refused(run_gridlight, constant_file, tmp_path):
     other = tmp_path / "other.exr"
     probe_file.write(other, Field.empty(Grid.from_bounds((0, 0, 0), (1, 1, 1), (3, 4, 5)), 3))
