@@ -49,7 +49,7 @@ def add_arguments(parser, in_blender: bool) -> None:
         help="three: N³ cells of the atlas for each, so that it looks closer to surfaces (default 1)",
     )
     parser.add_argument("--scene", metavar="FILE.blend", help="three: put its GLB and lamps beside the probes")
-    parser.add_argument("--probe", type=counts, metavar="I,J,K", help="cubemap: which (default: nearest to the middle)")
+    parser.add_argument("--probe", type=counts, metavar="I,J,K", help="of one probe: which (default: near the middle)")
     parser.add_argument("--layout", default="cross", metavar="L", help=f"cubemap: {', '.join(LAYOUTS)}")
     parser.add_argument("--size", type=int, default=64, metavar="N", help="cubemap: edge of a face, panorama's height")
     parser.add_argument("--quiet", action="store_true", help="no progress")

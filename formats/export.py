@@ -21,17 +21,19 @@ from pathlib import Path
 import numpy as np
 
 from ..core import dilation, ringing, windowing
-from ..core.conventions import ACTIVE, CULLED, INVALID, MAX_BANDS
+from ..core.conventions import ACTIVE, MAX_BANDS
 from ..core.errors import InputError
-from ..core.field import Field
+from ..core.field import Field, state_counts
 from ..core.gradients import gradient_bands
 from . import (
     export_bevy,
     export_cubemap,
+    export_filament,
     export_flipbook,
     export_godot,
     export_json,
     export_three,
+    export_three_light,
     export_unity,
 )
 from .export_lattice import Lattice, Resampling, axes_matrix, converted
@@ -47,6 +49,8 @@ TARGETS = {
     "exr-flipbook": export_flipbook,
     "json": export_json,
     "cubemap": export_cubemap,
+    "three-light": export_three_light,
+    "filament": export_filament,
 }
 INACTIVE = ("fill", "zero")
 LAYOUTS = ("cross", "faces", "equirect")
@@ -68,7 +72,7 @@ class ExportOptions:
     inactive: str = "fill"  # probes without light of their own: their neighbours' light, or none
     gain: float = 1.0  # factor on all light
     refine: int = 1  # three: cells of the atlas along each edge of a cell
-    probe: tuple[int, int, int] | None = None  # cubemap: which one; None: the active probe nearest to the middle
+    probe: tuple[int, int, int] | None = None  # of one probe: which; None: the active one nearest to the middle
     layout: str = "cross"
     size: int = 64  # cubemap: edge of a face, height of a panorama
 
@@ -262,10 +266,7 @@ def _conventions(module, job: ExportJob, axes: np.ndarray, layout: dict, source_
             "precision": job.encode.precision,
         },
         "probes": {
-            "total": source.grid.count,
-            "active": int((source.state == ACTIVE).sum()),
-            "culled": int((source.state == CULLED).sum()),
-            "invalid": int((source.state == INVALID).sum()),
+            **state_counts(source.state),
             "culled_and_invalid_hold": inactive + (" (filled on export)" if filled else ""),
         },
         "resampled": None

@@ -18,10 +18,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..core import spherical_harmonics as sh
-from ..core.conventions import ACTIVE
-from ..core.errors import InputError
 from ..core.panorama import panorama_directions
 from .export_lattice import axes_matrix
+from .one_probe import choose_probe, place_of
 from .openexr_file import write_image
 
 AXES, PRECISION, BANDS, SUFFIX = "y-up", "half", 4, ".exr"
@@ -41,11 +40,7 @@ def write(job) -> dict:
     options = job.options
     node = choose_probe(job)
     coefficients = job.lattice.coefficients[node].astype(float)
-    layout = {
-        "probe": job.source.grid.lattice()[node].tolist(),
-        "position": job.lattice.grid.positions()[node].tolist(),
-        "arrangement": options.layout,
-    }
+    layout = {**place_of(job, node), "arrangement": options.layout}
     if options.layout == "equirect":
         turn = axes_matrix(AXES if options.axes is None else options.axes)
         directions = panorama_directions(2 * options.size, options.size)[::-1] @ turn.T
@@ -71,26 +66,6 @@ def face_directions(size: int) -> np.ndarray:
     places = right[..., None] * RIGHT[:, None, None] + down[..., None] * DOWN[:, None, None]
     directions = FORWARD[:, None, None] + places
     return directions / np.linalg.norm(directions, axis=-1, keepdims=True)
-
-
-def choose_probe(job) -> int:
-    """Flat index of the probe asked for; without one, of the active probe nearest to the middle of the box.
-
-    Raises:
-        InputError: there is no such probe.
-    """
-    grid = job.source.grid
-    if job.options.probe is not None:
-        place, counts = np.array(job.options.probe), np.array(grid.resolution)
-        if (place < 0).any() or (place >= counts).any():
-            shown = ",".join(map(str, job.options.probe))
-            raise InputError(f"--probe {shown}: the grid has {' × '.join(map(str, counts))} probes, counted from 0")
-        return int(place @ [1, counts[0], counts[0] * counts[1]])
-    active = np.flatnonzero(job.source.state == ACTIVE)
-    if not len(active):
-        raise InputError("no probe is active; name one with --probe I,J,K")
-    distance = np.linalg.norm(grid.positions()[active] - grid.center, axis=1)
-    return int(active[distance.argmin()])
 
 
 def _picture(job, coefficients: np.ndarray, directions: np.ndarray) -> np.ndarray:

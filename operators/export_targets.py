@@ -14,6 +14,8 @@ _TITLES = {
     "exr-flipbook": "EXR Flipbook",
     "json": "JSON",
     "cubemap": "Cubemap of One Probe",
+    "three-light": "three.js, One Light Probe",
+    "filament": "Filament, One Probe",
 }
 
 TARGET_ITEMS = [

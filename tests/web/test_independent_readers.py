@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exported files in readers that are not ours: ktx-parse, three.js's EXRLoader, Khronos' glTF validator."""
+"""Exported files in readers that are not ours: ktx-parse, three.js's EXRLoader and ObjectLoader."""
 
 import base64
 from pathlib import Path
 
 import numpy as np
 import pytest
-from export_fields import PLACEMENTS, lit_field
+from export_fields import PLACEMENTS, Y_UP, lit_field
+from gridlight.core import spherical_harmonics as sh
 from gridlight.formats.export import ExportOptions, export
 from gridlight.formats.export_bevy import ambient_cubes
 from gridlight.formats.export_lattice import axes_matrix, converted, right_handed
@@ -47,3 +48,15 @@ def test_exr_in_threes_loader(packages, node, tmp_path, precision):
     for node_index, (i, j, k) in enumerate(field.grid.lattice()):
         texels = pixels[j::ny, k * nx + i, :3]
         np.testing.assert_allclose(texels, field.coefficients[node_index], rtol=2.0**-10, atol=1e-4)
+
+
+def test_a_light_probe_in_threes_object_loader(packages, node, tmp_path):
+    field = lit_field(*PLACEMENTS["turned"], linear=False)
+    export(field, "three-light", tmp_path / "light.json", ExportOptions(probe=(1, 2, 3)))
+    node_index = 1 + 3 * (2 + 5 * 3)
+    normals = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
+    found = node(HERE / "read_light_probe.mjs", tmp_path / "light.json", *(normals @ Y_UP.T).ravel())
+    assert found["type"] == "LightProbe"
+    np.testing.assert_allclose(found["position"], Y_UP @ field.grid.positions()[node_index], rtol=1e-6)
+    expected = [sh.irradiance(field.coefficients[node_index], normal) for normal in normals]
+    np.testing.assert_allclose(found["irradiance"], expected, rtol=1e-5, atol=1e-5)
