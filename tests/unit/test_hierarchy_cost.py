@@ -5,7 +5,8 @@ import time
 
 import numpy as np
 import pytest
-from gridlight.core import bvh, instances, rays
+import two_level_hierarchy as instances
+from gridlight.core import bvh, rays
 
 MIB_PER_TEXEL = 16 / 2**20
 ATTRIBUTE_TEXELS = 5  # a triangle, gpu_shaders/glsl/surface_lib.glsl

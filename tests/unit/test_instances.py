@@ -3,7 +3,8 @@
 
 import numpy as np
 import pytest
-from gridlight.core import bvh, instances, rays
+import two_level_hierarchy as instances
+from gridlight.core import bvh, rays
 
 
 def placed(generator, count, spread=2.0):

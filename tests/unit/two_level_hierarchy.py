@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A hierarchy of hierarchies: one per mesh in the mesh's own space, and one over the boxes of its instances.
+"""A hierarchy of hierarchies, measured against the flat one and not taken into the program: one per mesh in the mesh's
+own space, and one over the boxes of its instances.
 
 Memory then grows with meshes and not with instances, and an instance that moves costs one matrix and a new top. Rays
 pay for it where instances overlap: each is entered and left on its own. ``docs/measurements.md`` has both sides.
@@ -13,8 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from . import bvh, rays
+from gridlight.core import bvh, rays
 
 INSTANCE_TEXELS = 3  # rows of the world-to-mesh matrix, as a GPU would keep them
 
