@@ -23,6 +23,9 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **options):
         super().__init__(allow_abbrev=False, **options)
+        # In place of argparse's "invalid int value".
+        self.register("type", int, whole)
+        self.register("type", float, number)
 
     def error(self, message):
         raise InputError(f"{' '.join(message.split())} ('{self.prog} --help' lists the options)")
@@ -53,6 +56,22 @@ def _is_value(word: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def whole(text: str) -> int:
+    """A whole number."""
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number") from None
+
+
+def number(text: str) -> float:
+    """A number; the range is the option's business."""
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number") from None
 
 
 def point(text: str) -> tuple[float, float, float]:

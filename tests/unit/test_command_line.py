@@ -59,6 +59,9 @@ def assert_one_line(done, status, *words):
         (["--min", "-o"], ["--min", "-o"]),
         (["--", "--min", "-1,0,0"], ["--", "--min", "-1,0,0"]),
         (["--frame", "-3"], ["--frame=-3"]),
+        (["--relight", "-3", "--quiet", "-o", "out"], ["--relight=-3", "--quiet", "-o", "out"]),
+        (["--axes", "-x,z,y"], ["--axes=-x,z,y"]),
+        (["--frames", "-5--3"], ["--frames=-5--3"]),
     ],
 )
 def test_values_with_a_minus_sign(given, read):
@@ -86,7 +89,8 @@ def test_lengths_that_are_none(text):
         (["bake", "x.blend"], ["-o"]),
         (["bake", "x.blend", "-o", "out"], ["x.blend", "no such file"]),
         (["bake", "x.blend", "-o", "out", "--bands", "5"], ["--bands is 5", "1 and 4"]),
-        (["bake", "x.blend", "-o", "out", "--bands", "three"], ["--bands", "three"]),
+        (["bake", "x.blend", "-o", "out", "--bands", "three"], ["--bands", "'three' is not a whole number"]),
+        (["bake", "x.blend", "-o", "out", "--tolerance", "little"], ["--tolerance", "'little' is not a number"]),
         (["bake", "x.blend", "-o", "out", "--face", "1000"], ["--face is 1000"]),
         (["bake", "x.blend", "-o", "out", "--bounces", "-1"], ["--bounces is -1"]),
         (["bake", "x.blend", "-o", "out", "--bounces", "many"], ["--bounces", "many"]),
