@@ -7,7 +7,7 @@ import numpy as np
 
 from ..core import measures
 from ..core.errors import InputError
-from . import bench_plot, bench_table
+from . import bench_peers_plot, bench_peers_table
 from .bench_run import Run
 
 GALLERY = "gallery"  # a name of bench_scenes, which only processes with Blender can import
@@ -55,8 +55,8 @@ def measure(run: Run) -> dict:
     }
 
 
-table = bench_table.table
-plot = bench_plot.plot
+table = bench_peers_table.table
+plot = bench_peers_plot.plot
 
 
 def cycles_request(scene: str, panorama, count: int | None, nodes: list, bands: int) -> dict:
