@@ -103,7 +103,7 @@ def add_settings(parser) -> None:
         type=int,
         action=arguments.Given,
         default=standard.gather,
-        help="bounces really traced before the field is read (default %(default)s)",
+        help="bounces really traced before patches are read (default %(default)s)",
     )
     group.add_argument(
         "--samples",
@@ -111,7 +111,7 @@ def add_settings(parser) -> None:
         type=int,
         action=arguments.Given,
         default=standard.samples,
-        help="shadow samples per texel and soft light (default %(default)s)",
+        help="times the rays and the samples of light that a patch takes (default %(default)s)",
     )
     group.add_argument(
         "--capture", choices=CAPTURES, default=standard.capture, help="how probes see (default %(default)s)"

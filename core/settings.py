@@ -25,7 +25,7 @@ class BakeSettings:
     bounces: int | None = None  # None: as many as the tolerance asks for ("auto")
     tolerance: float = 2e-3  # relative energy still missing when iterations stop
     gather: int = 0
-    samples: int = 1  # shadow samples per texel and soft light
+    samples: int = 1  # times the rays and the samples of light of a patch (patches.effort)
     capture: str = "auto"
     seed: int = 0
     keep_all: bool = False

@@ -257,7 +257,7 @@ class GridlightSettings(bpy.types.PropertyGroup):
     )
     samples: IntProperty(
         name="Light Samples",
-        description="Shadow rays per texel to each soft light; more take noise out of soft shadows",
+        description="How many times the rays and the samples of light that each patch takes; more take out noise",
         default=_STANDARD.samples,
         min=1,
         max=4096,
