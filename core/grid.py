@@ -61,6 +61,10 @@ class Grid:
         nx, ny, nz = self.resolution
         return nx * ny * nz
 
+    def has_nodes_of(self, other: Grid) -> bool:
+        """Whether every node is where that of ``other`` is; names may differ."""
+        return tuple(self.resolution) == tuple(other.resolution) and np.array_equal(self.matrix, other.matrix)
+
     @property
     def center(self) -> np.ndarray:
         """(3,) float64 world position of the box's middle."""

@@ -28,6 +28,10 @@ class ProbeEdits:
     def any(self) -> bool:
         return bool(self.disabled.any() or self.offset.any())
 
+    def equals(self, other: ProbeEdits) -> bool:
+        """Whether both decide the same about every probe; for grids with the same number of probes."""
+        return np.array_equal(self.disabled, other.disabled) and np.array_equal(self.offset, other.offset)
+
 
 def bounded(grid: Grid, offset: np.ndarray) -> np.ndarray:
     """``offset`` (P, 3) world metres, held within ``CELL_REACH`` of a cell along each axis of the grid's box."""

@@ -7,7 +7,6 @@ They go with the next bake, with the file, and with the extension.
 from __future__ import annotations
 
 import bpy
-import numpy as np
 from bpy.app.handlers import persistent
 
 from ..bake.block_session import open_session
@@ -70,14 +69,11 @@ class KeptBake:
     def fits(self, grid: Grid, settings: BakeSettings, edits: ProbeEdits | None) -> bool:
         """Whether a relight gives what a bake of ``grid`` with these settings and edits would. Never where an error was
         asked for: a relight does not look after it."""
-        edits = edits or ProbeEdits.none(grid)
         return (
             self._driven is None
             and settings == self._settings
-            and tuple(grid.resolution) == tuple(self._grid.resolution)
-            and np.array_equal(grid.matrix, self._grid.matrix)
-            and np.array_equal(edits.disabled, self._edits.disabled)
-            and np.array_equal(edits.offset, self._edits.offset)
+            and grid.has_nodes_of(self._grid)
+            and (edits or ProbeEdits.none(grid)).equals(self._edits)
         )
 
 

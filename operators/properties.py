@@ -247,8 +247,8 @@ class GridlightSettings(bpy.types.PropertyGroup):
     )
     gather: IntProperty(
         name="Gather",
-        description="Bounces that are really traced before probes are read. 1 takes interpolation out of what probes "
-        "see and makes a bake several times longer",
+        description="Bounces that every texel traces before patches are read. 1 gains little over more Light Samples "
+        "in most scenes and makes a bake several times longer",
         default=_STANDARD.gather,
         min=0,
         max=16,

@@ -30,6 +30,6 @@ def sync(scene) -> None:
 
 def field_changed(volume_object) -> None:
     """Tells every view that another field was stored for ``volume_object``."""
-    from . import sessions
+    from . import changes, sessions
 
-    sessions.mark_all("fields")
+    sessions.mark_all(changes.FIELDS)

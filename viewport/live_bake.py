@@ -39,13 +39,8 @@ class Target:
 
     def equals(self, other: Target) -> bool:
         """Whether a bake for ``other`` can be relit for this one."""
-        same_grid = self.grid.resolution == other.grid.resolution and np.array_equal(
-            self.grid.matrix, other.grid.matrix
-        )
         mine, others = (item.edits or ProbeEdits.none(item.grid) for item in (self, other))
-        return (
-            same_grid and np.array_equal(mine.disabled, others.disabled) and np.array_equal(mine.offset, others.offset)
-        )
+        return self.grid.has_nodes_of(other.grid) and mine.equals(others)
 
 
 @dataclass

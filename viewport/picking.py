@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 from bpy_extras import view3d_utils
 
+from ..core.conventions import ACTIVE
 from ..gpu_shaders.viewport_pass import Probes
 from .sessions import SceneSession
 
@@ -22,7 +23,7 @@ def probe_at(
     nearest, found = np.inf, None
     for name, field in session.gpu.fields.items():
         grid = field.field.grid
-        radius = probes.radius(grid) * np.where(field.field.state == 1, 1.0, 0.5)
+        radius = probes.radius(grid) * np.where(field.field.state == ACTIVE, 1.0, 0.5)
         distance = sphere_distances(field.positions + grid.center, radius, origin, direction)
         node = int(np.argmin(distance))
         if distance[node] < nearest:

@@ -2,7 +2,8 @@
 """Scenes as views show them: read once, kept on the GPU, and brought up to date from a timer.
 
 Draw callbacks must not evaluate anything, so they only ask for a session and draw what it has; reading and relighting
-happen in ``tick``. A session lives as long as some view of its scene shows Gridlight's light.
+happen in ``update`` and ``relight``, which the timer of handlers.py calls. A session lives as long as some view of its
+scene shows Gridlight's light.
 """
 
 from __future__ import annotations

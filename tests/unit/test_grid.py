@@ -55,6 +55,13 @@ def test_one_node_axis_has_lattice_coordinate_zero_everywhere():
     assert (to_lattice[1] == 0).all()
 
 
+def test_grids_with_the_same_nodes():
+    grid = Grid.from_bounds((0, 0, 0), (1, 2, 3), (2, 3, 4), "hall")
+    assert grid.has_nodes_of(Grid(grid.matrix.copy(), [2, 3, 4], "attic"))
+    assert not grid.has_nodes_of(Grid.from_bounds((0, 0, 0), (1, 2, 3), (2, 3, 5)))
+    assert not grid.has_nodes_of(Grid.from_bounds((0, 0, 0), (1, 2, 3.5), (2, 3, 4)))
+
+
 def test_cell_size_of_a_rotated_box():
     np.testing.assert_allclose(Grid(rotated_matrix(), (3, 2, 4)).cell_size(), [2, 1, 2], rtol=1e-12)
 
