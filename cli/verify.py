@@ -13,6 +13,7 @@ from ..core.conventions import ACTIVE
 from ..core.errors import InputError
 from ..core.field import Field
 from ..core.ringing import ringing
+from ..core.world_suns import extract_suns
 from ..formats import probe_file, report_errors
 from ..formats.report import write_page
 from ..formats.staging import StagedFolder
@@ -101,7 +102,8 @@ def run(args, reporter, should_stop):
         reporter.phase("points")
         space = verify_points.FreeSpace(snapshot, verify_points.cycles_light(scene, frame))
         kinds = choose_points(field, space, args.points, args.seed)
-        reference = Reference(scene, args.spp, args.height, frame, reporter, should_stop)
+        _, suns = extract_suns(snapshot.world)
+        reference = Reference(scene, args.spp, args.height, frame, reporter, should_stop, suns)
         rows = measure(field, kinds, reference, reporter, args.trilinear)
         engine = f"Cycles {2 * args.height}×{args.height}, 2 × {args.spp} samples"
         reporter.result(table(rows, field, engine))

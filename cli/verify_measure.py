@@ -7,6 +7,7 @@ point itself (the floor), and perfect probes at the nodes with a plain trilinear
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ from ..core.errors import Cancelled, InputError
 from ..core.field import Field
 from ..core.grid import Grid
 from ..core.panorama import panorama_irradiance, project_panorama
+from ..core.snapshot import Light
 
 _SEEDS = 1, 1_000_003  # panoramas take consecutive seeds from their first: the series never meet
 _NODE_SEED = 2_000_003
@@ -64,14 +66,16 @@ class Row:
 
 
 class Reference:
-    """Cycles panoramas of ``scene``; says how far it is and stops where it is asked to.
+    """Cycles panoramas of ``scene``, whose world has ``suns``; says how far it is and stops where it is asked to.
 
     Raises:
         Cancelled: ``should_stop`` returned true between two panoramas.
     """
 
-    def __init__(self, scene, samples: int, height: int, frame: int | None, reporter, should_stop):
-        self._scene, self._samples, self._height, self._frame = scene, samples, height, frame
+    def __init__(
+        self, scene, samples: int, height: int, frame: int | None, reporter, should_stop, suns: Sequence[Light] = ()
+    ):
+        self._scene, self._samples, self._height, self._frame, self._suns = scene, samples, height, frame, suns
         self._reporter, self._should_stop = reporter, should_stop
 
     def panoramas(self, positions: np.ndarray, seed: int) -> np.ndarray:
@@ -85,6 +89,7 @@ class Reference:
             self._height,
             self._samples,
             seed,
+            suns=self._suns,
             frame=self._frame,
             progress=self._progress,
         )

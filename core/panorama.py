@@ -24,21 +24,27 @@ from .spherical_harmonics import basis
 _INTEGRATION_ROWS = 256
 
 
-def panorama_directions(width: int, height: int) -> np.ndarray:
-    """(height, width, 3) float64 unit directions of the pixel centres, world space."""
-    longitude = np.pi - 2 * np.pi * (np.arange(width) + 0.5) / width
-    latitude = np.pi * ((np.arange(height) + 0.5) / height - 0.5)
-    directions = np.empty((height, width, 3))
+ALL = slice(None)
+
+
+def panorama_directions(width: int, height: int, rows=ALL, columns=ALL) -> np.ndarray:
+    """(height, width, 3) float64 unit directions of the pixel centres, world space; of ``rows`` and ``columns`` only
+    where those are given."""
+    longitude = np.pi - 2 * np.pi * (np.arange(width)[columns] + 0.5) / width
+    latitude = np.pi * ((np.arange(height)[rows] + 0.5) / height - 0.5)
+    directions = np.empty((len(latitude), len(longitude), 3))
     directions[..., 0] = np.cos(latitude)[:, None] * np.cos(longitude)
     directions[..., 1] = np.cos(latitude)[:, None] * np.sin(longitude)
     directions[..., 2] = np.sin(latitude)[:, None]
     return directions
 
 
-def panorama_solid_angles(width: int, height: int) -> np.ndarray:
-    """(height, width) float64 exact solid angles of the pixels in steradians; they sum to 4π."""
+def panorama_solid_angles(width: int, height: int, rows=ALL, columns=ALL) -> np.ndarray:
+    """(height, width) float64 exact solid angles of the pixels in steradians; they sum to 4π. Of ``rows`` and
+    ``columns`` only where those are given."""
     edges = np.sin(np.pi * (np.arange(height + 1) / height - 0.5))
-    return np.repeat(np.diff(edges)[:, None], width, axis=1) * (2 * np.pi / width)
+    in_row = np.diff(edges)[rows] * (2 * np.pi / width)
+    return np.repeat(in_row[:, None], len(np.arange(width)[columns]), axis=1)
 
 
 def panorama_coordinates(directions: np.ndarray) -> np.ndarray:

@@ -86,7 +86,7 @@ class ReferenceEmitters:
         """(N, 3) irradiance at ``points`` (N, 3) by sample ``index`` of the sequences of ``keys`` (N, 3): one point on
         the emitters and one direction about the normal, weighted by the balance heuristic. Rays start at ``origins``
         (N, 3)."""
-        return self._by_points(points, origins, normals, keys, index) + self._by_directions(
+        return self._by_points(points, origins, normals, keys, index) + self.by_directions(
             origins, normals, keys, index
         )
 
@@ -141,7 +141,9 @@ class ReferenceEmitters:
         result[lit] = best.irradiance[lit] * (total[lit] / (best_weight[lit] * CANDIDATES))[:, None]
         return result
 
-    def _by_directions(self, origins, normals, keys, index) -> np.ndarray:
+    def by_directions(self, origins: np.ndarray, normals: np.ndarray, keys: np.ndarray, index) -> np.ndarray:
+        """(N, 3) irradiance by one direction about each of ``normals`` (N, 3), which finds emitters within
+        ``reach``."""
         u = sample_r2(shifted(keys, 0, _DIRECTION_STREAM, 0), index).astype(float)
         direction = sample_cosine(normals, u)
         hits = self.scene.closest(origins, direction)

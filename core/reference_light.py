@@ -142,7 +142,8 @@ class ReferenceLight:
                     self.emitters.unshadowed(point, normal, keys, number) @ LUMINANCE
                     for number in (2 * index, 2 * index + 1)
                 )
-                luminance[index] = (one + other) / 2
+                near = self.emitters.by_directions(leave_surface(point, normal), normal, keys, index) @ LUMINANCE
+                luminance[index] = (one + other) / 2 + near
                 candidate_variance += (one - other) ** 2 / 2 / count
             else:
                 lamps = self._lamps(point, point, normal, keys, index, shadows=False, part=part)

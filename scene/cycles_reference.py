@@ -8,13 +8,15 @@ the light of surfaces and of the world only.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import bpy
 import numpy as np
 from mathutils import Euler
 
+from ..core.panorama import panorama_coordinates, panorama_directions, panorama_solid_angles
+from ..core.snapshot import Light
 from .evaluation import rendered_objects
 from .temporary import render_pixels, scene_copy
 
@@ -23,6 +25,10 @@ PANORAMA_ROTATION = (np.pi / 2, 0.0, -np.pi / 2)
 
 # Panoramic cameras clip too; a probe may stand closer to a wall than the default 0.1 m.
 _CLIP_NEAR_M, _CLIP_FAR_M = 1e-6, 1e7
+
+# How finely suns of the world are rendered: pixels across one, and samples of each. A pixel of a few degrees, with
+# samples all over it, hardly meets a disc.
+_ACROSS_SUN, _SUN_SAMPLES, _MOST_WIDTH = 6, 256, 32768
 
 _FAR_M = 1000.0  # from the origin: single precision has 0.06 mm there
 
@@ -36,6 +42,7 @@ def render_panoramas(
     seed: int = 0,
     bounces: int = 32,
     *,
+    suns: Sequence[Light] = (),
     frame: int | None = None,
     progress=None,
 ) -> np.ndarray:
@@ -46,6 +53,9 @@ def render_panoramas(
 
     Args:
         bounces: the path length limit for every kind of ray; paths end earlier only by Russian roulette.
+        suns: of the world (``core.world_suns``). What is seen of them is rendered again, so finely that no sample
+            misses it, and shared out between the four pixels around its direction: a single one would move it by
+            degrees.
         progress: called as ``progress(done, N)`` after each panorama.
 
     Returns:
@@ -63,9 +73,69 @@ def render_panoramas(
             copy.camera.location = position
             copy.cycles.seed = (seed + index) % (2**31 - 1)
             panoramas[index] = render_pixels(copy, layer)
+            for sun in suns:
+                _refine(copy, layer, panoramas[index], sun)
             if progress is not None:
                 progress(index + 1, len(positions))
     return panoramas
+
+
+def _refine(copy: bpy.types.Scene, layer: str, panorama: np.ndarray, sun: Light) -> None:
+    """Put what is seen of ``sun`` into ``panorama``, in place of what samples met of it."""
+    height, width = panorama.shape[:2]
+    rows, columns = _covered(sun, width, height)
+    around = panorama[np.clip([rows[0] - 1, rows[-1] + 1], 0, height - 1)][:, columns].reshape(-1, 3)
+    level = np.median(around, axis=0)
+    panorama[np.ix_(rows, columns)] = level
+    finer = int(np.clip(np.ceil(_ACROSS_SUN * np.pi / height / max(sun.angle, 1e-6)), 1, _MOST_WIDTH // width))
+    flux, towards = np.zeros(3), np.zeros(3)
+    for radiance, solid_angles, directions in _close_up(copy, layer, sun, width * finer, height * finer):
+        light = np.maximum(radiance - level, 0.0) * solid_angles[..., None]
+        flux += light.sum(axis=(0, 1))
+        towards += np.einsum("rc,rci->i", light.sum(axis=-1), directions)
+    if not flux.any():
+        return
+    place = panorama_coordinates(towards) * [width, height] - 0.5
+    first = np.floor(place).astype(int)
+    for step in np.ndindex(2, 2):
+        share = np.where(step, place - first, 1 - (place - first)).prod()
+        column, row = (first[0] + step[0]) % width, int(np.clip(first[1] + step[1], 0, height - 1))
+        panorama[row, column] += share * flux / panorama_solid_angles(width, height)[row, column]
+
+
+def _close_up(copy: bpy.types.Scene, layer: str, sun: Light, width: int, height: int):
+    """Radiance (R, C, 3), solid angles (R, C) and directions (R, C, 3) of those pixels of a panorama of this size that
+    ``sun`` covers, in one part, or in two where it stands on the seam."""
+    render, cycles = copy.render, copy.cycles
+    plain = render.resolution_x, render.resolution_y, cycles.samples
+    render.resolution_x, render.resolution_y, cycles.samples = width, height, _SUN_SAMPLES
+    render.use_border = render.use_crop_to_border = True
+    rows, columns = _covered(sun, width, height)
+    render.border_min_y, render.border_max_y = rows[0] / height, (rows[-1] + 1) / height
+    for part in np.split(columns, np.flatnonzero(np.diff(columns) != 1) + 1):
+        render.border_min_x, render.border_max_x = part[0] / width, (part[-1] + 1) / width
+        radiance = render_pixels(copy, layer)
+        yield radiance, panorama_solid_angles(width, height, rows, part), panorama_directions(width, height, rows, part)
+    render.use_border = render.use_crop_to_border = False
+    render.resolution_x, render.resolution_y, cycles.samples = plain
+
+
+def _covered(sun: Light, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns of the pixels that the disc of ``sun`` and half as much around it lie on, each sorted."""
+    radius = 0.75 * sun.angle
+    angle = np.linspace(0, 2 * np.pi, 64, endpoint=False)[:, None]
+    rim = np.cos(angle) * sun.matrix[:3, 0] + np.sin(angle) * sun.matrix[:3, 1]
+    rim = np.cos(radius) * sun.matrix[:3, 2] + np.sin(radius) * rim
+    column = np.floor(panorama_coordinates(rim)[:, 0] * width).astype(int) % width
+    rows = np.arange(_row(rim[:, 2].min(), height), _row(rim[:, 2].max(), height) + 1)
+    if np.ptp(column) > width // 2:  # across the seam, or around a pole
+        column = np.where(column < width // 2, column + width, column)
+    return rows, np.unique(np.arange(column.min(), column.max() + 1) % width)
+
+
+def _row(z: float, height: int) -> int:
+    """Row of a panorama that directions with this z fall into."""
+    return min(int((np.arcsin(np.clip(z, -1, 1)) / np.pi + 0.5) * height), height - 1)
 
 
 def _brought_near(copy: bpy.types.Scene, positions: np.ndarray) -> np.ndarray:

@@ -27,6 +27,7 @@ void main()
     float one = dot(emitter_unshadowed(at.xyz, normal, key, 2 * i), LUMINANCE);
     float other = dot(emitter_unshadowed(at.xyz, normal, key, 2 * i + 1), LUMINANCE);
     luminance += 0.5 * (one + other);
+    luminance += dot(emitter_direction_irradiance(leave_surface(at.xyz, normal), normal, key, i), LUMINANCE);
     candidate_variance += 0.5 * (one - other) * (one - other) / float(count);
 #endif
     sum += luminance;

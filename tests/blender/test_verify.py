@@ -156,3 +156,33 @@ def _in_box(points, middle, width, height, turn):
     x, y = (points[:, :2] - middle).T
     u, v = np.cos(turn) * x + np.sin(turn) * y, -np.sin(turn) * x + np.cos(turn) * y
     return (np.abs(u) < width / 2) & (np.abs(v) < width / 2) & (points[:, 2] < height)
+
+
+@pytest.mark.parametrize("turn", [0.7, np.pi / 2], ids=["plain", "on the seam of the panorama"])
+def test_a_sun_disc_of_the_sky_is_not_missed(turn):
+    """Nothing but a sky with a sun of half a degree, which few samples of a pixel of six meet: irradiance must be that
+    of the sky rendered for the bake, whose sun has thousands."""
+    from gridlight.core.panorama import panorama_irradiance
+    from gridlight.core.world_suns import extract_suns
+    from gridlight.scene.cycles_reference import render_panoramas
+    from gridlight.scene.read import read_scene
+
+    scene = scenes.new_scene("Sun disc")
+    scenes.add_box(scene, "Far below", (-0.1, -0.1, -9.1), (0.1, 0.1, -9), scenes.diffuse((0.0, 0.0, 0.0)))
+    nodes, links = scene.world.node_tree.nodes, scene.world.node_tree.links
+    sky = nodes.new("ShaderNodeTexSky")
+    kinds = [item.identifier for item in sky.bl_rna.properties["sky_type"].enum_items]
+    sky.sky_type = "MULTIPLE_SCATTERING" if "MULTIPLE_SCATTERING" in kinds else "NISHITA"
+    sky.sun_elevation, sky.sun_rotation = 0.6, turn
+    links.new(sky.outputs["Color"], next(node for node in nodes if node.type == "BACKGROUND").inputs["Color"])
+    world = read_scene(scene).world
+    expected = panorama_irradiance(world.map, verify_points.SIX_NORMALS)
+    suns = extract_suns(world)[1]
+    assert len(suns) == 1
+    found, without = (
+        panorama_irradiance(render_panoramas(scene, [[0, 0, 0]], 64, 32, 4, suns=there)[0], verify_points.SIX_NORMALS)
+        for there in (suns, [])
+    )
+    scale = np.sqrt((expected**2).mean())
+    assert np.abs(found - expected).max() < 0.05 * scale
+    assert np.abs(without - expected).max() > 0.2 * scale, "the test can fail"

@@ -51,6 +51,19 @@ def test_a_sun_lies_in_the_texel_of_its_direction(face):
     assert len(lit) <= 4
 
 
+@pytest.mark.parametrize("face", (8, 16))
+def test_a_sun_shines_from_where_it_stands(face):
+    """Its light's mean direction is its own within a sixth of a texel; a single texel would be up to 0.7 off."""
+    solid_angles, directions = np.tile(texel_solid_angles(face), (6, 1, 1)), texel_directions(face)
+    for row, column in np.random.default_rng(5).integers((20, 0), (236, 512), (6, 2)):
+        sky = np.zeros((256, 512, 3), np.float32)
+        sky[row, column] = 100
+        light = world_texels(World(map=sky), face)[..., 0] * solid_angles
+        mean = np.einsum("frc,frci->i", light, directions)
+        cosine = mean @ panorama_directions(512, 256)[row, column] / np.linalg.norm(mean)
+        assert np.arccos(min(cosine, 1.0)) < np.pi / 2 / face / 6
+
+
 def test_a_smooth_sky_is_what_its_directions_say():
     """A map of 1 + z, resolved well, must come back as 1 + z at the texels: this fixes up, down and the sides."""
     for axis in range(3):
