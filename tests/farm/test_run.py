@@ -94,7 +94,7 @@ def launch(tmp_path):
     test."""
     started = []
 
-    def begin(command, body=""):
+    def begin(command, body="", **environment):
         (tmp_path / "marks").mkdir(exist_ok=True)
         script = tmp_path / f"sabotage{len(started)}.py"
         script.write_text(SABOTAGE.format(marks=str(tmp_path / "marks"), body=body))
@@ -104,7 +104,7 @@ def launch(tmp_path):
         chosen = {"GRIDLIGHT_BLENDER_PYTHON": str(python if body else sys.executable)}
         process = subprocess.Popen(
             [*map(str, command)],
-            env={**os.environ, **chosen},
+            env={**os.environ, **chosen, **environment},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -223,7 +223,10 @@ def test_a_run_that_ends_early_is_resumed(number, planned, start, plain, tmp_pat
     assert_shard_2_was_tried_again(job, plain)
 
 
-def test_workers_of_a_scheduler_that_is_killed_and_started_again(planned, start, cluster, plain, tmp_path):
+def test_workers_of_a_scheduler_that_is_killed_and_started_again(
+    planned, start, launch, cluster, dask_python, plain, tmp_path
+):
+    """Whoever runs the job needs no GPU: the workers have theirs."""
     job = planned()
     scheduler, workers, address = cluster(2, HOLDS_SHARD_2)
     process = start(job, address)
@@ -236,7 +239,10 @@ def test_workers_of_a_scheduler_that_is_killed_and_started_again(planned, start,
         assert worker.wait(timeout=120) is not None  # they end by themselves
     wait_for(lambda: not servants(job))
     _, _, address = cluster(2)
-    ended(start(job, address))
+    command = [dask_python, "-I", FARM, "run", job, "--scheduler", address]
+    _, errors = ended(launch(command, LIBGL_DRIVERS_PATH="/nonexistent"))
+    assert "no pictures are drawn here" in errors
+    assert sorted(os.listdir(job / "result")) == ["probes.exr", "report.html"]
     assert_shard_2_was_tried_again(job, plain)
 
 
