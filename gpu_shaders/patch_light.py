@@ -95,13 +95,15 @@ class PatchLight:
 
     def connect(self) -> Steps[None]:
         """Traces the rays between patches, round by round until they find no surface that is no patch yet, and makes
-        room for the bounces; in steps."""
-        self._rays_each = RAYS * self._direct.effort
+        room for the bounces; in steps. Where light is not to bounce nobody asks where rays end: each patch has one then
+        and none looks for surface."""
+        is_direct = self._settings.bounces == 0 and not self._settings.gather
+        self._rays_each = 1 if is_direct else RAYS * self._direct.effort
         self._ends, self._reflected = GrowingArray("rays", "R32F"), GrowingArray("rays")
         self._brought = GrowingArray("patches")
         self._ends.reserve(0)
         stop = 0
-        for round_ in range(MOST_ROUNDS):
+        for round_ in range(MOST_ROUNDS - 1 if is_direct else 0, MOST_ROUNDS):
             start, stop = stop, self.count
             for first, rays in self._trace_patches(start, stop):
                 ends = self.patches.bind_ends(rays.hits, rays.count, round_)
