@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
+import leaks
 import numpy as np
 
 EXTENSION = "bl_ext.user_default.gridlight"
@@ -23,6 +24,7 @@ READING_SCALE = 3  # letters of the interface are 8 to 11 pixels high; text reco
 LEVELS = ("45%,85%", "20%,75%")
 LOOKS = 6  # at the screen before a person gives up looking for something
 REACTION_SECONDS = 0.25  # between a click and what it shows
+LAST_TIMER_SECONDS = 8.0  # a file's light is compared with its scene a moment after the last edit
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,8 @@ class Person:
 
     def __init__(self, scenario: str):
         self._scenario = scenario
-        self._handlers = _gridlight_handlers()
+        self._handlers = leaks.application_handlers(EXTENSION)
+        self._on_gpu = leaks.gpu_objects()
         self.clicks = 0
 
     # Blender's side
@@ -235,16 +238,32 @@ class Person:
     # Afterwards
     # ------------------------------------------------------------------------------------------------------------------
 
-    def check_nothing_leaked(self) -> None:
-        """No handler more than before, and no operator still running."""
-        assert _gridlight_handlers() == self._handlers, (self._handlers, _gridlight_handlers())
+    def check_nothing_runs(self) -> Iterator[float]:
+        """No handler more than before; no timer, drawing or operator is left. What ends by itself has a moment to."""
+        waited = 0.0
+        while timers := leaks.timers(EXTENSION):
+            assert waited < LAST_TIMER_SECONDS, f"timers left: {timers}"
+            waited += REACTION_SECONDS
+            yield REACTION_SECONDS
+        handlers = leaks.application_handlers(EXTENSION)
+        assert handlers == self._handlers, f"handlers before: {self._handlers}, now: {handlers}"
+        drawing = leaks.draw_handlers(EXTENSION)
+        assert not drawing, f"draw handlers left: {drawing}"
         running = [
             operator.bl_idname
             for window in bpy.context.window_manager.windows
             for operator in window.modal_operators
             if operator and operator.bl_idname.startswith("GRIDLIGHT_")  # None: of a class that is gone
         ]
-        assert not running, running
+        assert not running, f"operators left: {running}"
+        heard = yield from leaks.event_timers()
+        assert not heard, f"a window's timer is left: it sent {heard} events"
+
+    def check_nothing_is_held(self) -> None:
+        """On the GPU, for Python, no more than before. Bakes are kept as long as their file: ask after another is
+        loaded."""
+        grown = leaks.gpu_objects() - self._on_gpu
+        assert not grown, f"left on the GPU: {grown}"
 
 
 def _grab(rectangle: Rectangle | None) -> bytes:
@@ -262,15 +281,3 @@ def _pipe(command: list[str], data: bytes) -> bytes:
 def _alike(wanted: str, seen: str) -> bool:
     """Equal but for what surrounds a word: arrows and check boxes are read as letters beside it."""
     return wanted.casefold() == seen.strip("|[](){}<>.,:;'\"“”‘’«»_-=~*°").casefold()
-
-
-def _gridlight_handlers() -> dict[str, int]:
-    """How many application handlers of the extension there are, by list."""
-    counts = {}
-    for name in dir(bpy.app.handlers):
-        handlers = getattr(bpy.app.handlers, name)
-        if isinstance(handlers, list):
-            own = sum(getattr(handler, "__module__", "").startswith(EXTENSION) for handler in handlers)
-            if own:
-                counts[name] = own
-    return counts

@@ -24,7 +24,7 @@ POLL_SECONDS = 0.05
 FIRST_SECONDS = 1.5  # a window that has just appeared takes no notice of clicks
 SETTLE_SECONDS = 0.3  # after loading a file: time for its windows to be drawn
 
-
+_is_fresh = False  # whether the scenario before ended well and left a file as Blender starts with
 _unseen: list[str] = []  # exceptions in handlers, timers and panels: Blender prints them and goes on
 
 
@@ -63,9 +63,11 @@ class Server:
 
 def _scenario(file: str, name: str, arguments: list):
     """A fresh file, the scenario, and what must hold after each."""
+    global _is_fresh
     addon_utils.enable(EXTENSION)  # a scenario may have failed with the extension switched off
-    bpy.ops.wm.read_homefile(use_factory_startup=True)
-    yield SETTLE_SECONDS
+    if not _is_fresh:
+        yield from _load_fresh()
+    _is_fresh = False
     spec = importlib.util.spec_from_file_location(Path(file).stem, file)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -77,8 +79,16 @@ def _scenario(file: str, name: str, arguments: list):
         person.picture("failure")
         raise
     yield SETTLE_SECONDS
-    person.check_nothing_leaked()
+    yield from person.check_nothing_runs()
+    yield from _load_fresh()
+    _is_fresh = True
+    person.check_nothing_is_held()
     assert not _unseen, "\n".join(_unseen)
+
+
+def _load_fresh():
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    yield SETTLE_SECONDS
 
 
 def _write(path: Path, value: dict) -> None:

@@ -94,6 +94,10 @@ class User:
         yield 0.2
         self.person.move(3, 3)
         yield 0.2
+        try:
+            yield from self.person.check_nothing_runs()  # before loading a file, which would end much of what is left
+        except AssertionError as error:
+            raise AssertionError(f"after {self.said}") from error
         bpy.ops.wm.read_homefile(use_factory_startup=True)  # the last bake stays until then
         yield 0.2
         gc.collect()
