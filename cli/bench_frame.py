@@ -20,7 +20,7 @@ def measure(run: Run) -> dict:
     }
     merged, rows, _ = run.child(request, "the gallery while a light moves")
     keys = ("device", "blender", "scene", "picture", "cold_bake_seconds")
-    found = ("cold_picture_seconds", "limits", "profiled_seconds", "shaders", "functions", "problem")
+    found = ("cold_picture_seconds", "longest_steps", "limits", "profiled_seconds", "shaders", "functions", "problem")
     return {key: merged[key] for key in keys} | {key: merged.get(key) for key in found} | {"rows": rows}
 
 
@@ -36,10 +36,17 @@ def table(summary: dict) -> list[str]:
         f"{_ms(summary['cold_bake_seconds'])}, first picture {_ms(summary['cold_picture_seconds'] or 0.0)}.",
         "",
     ]
-    cells = [["", "median", "99th percentile", "count"]]
+    cells = [["", "median", "99th percentile", "longest", "count"]]
     for row in summary["rows"]:
-        cells.append([row["run"], _ms(row["median"]), _ms(row["percentile_99"]), str(row["count"])])
+        times = [_ms(row[name]) for name in ("median", "percentile_99", "longest")]
+        cells.append([row["run"], *times, str(row["count"])])
     lines += bench_table.columns(cells)
+    if summary["longest_steps"]:
+        lines += [
+            "",
+            "Bakes beside the interface: a timer event takes steps for 30 ms. Longest warm step, ms, by phase",
+        ]
+        lines += bench_table.columns([["phase", "ms"], *[[k, _ms(v)] for k, v in summary["longest_steps"].items()]])
     for row in summary["rows"]:
         if "phases" in row:
             lines += ["", f"{row['run']}: {row['patches']} patches, {row['iterations']} bounces; ms a relight"]

@@ -35,6 +35,7 @@ from ..viewport.live_bake import LiveBake, Target
 from . import bench_scenes
 from .bench_measure import report
 from .bench_measure_peers import facts_about, load_scene
+from .bench_measure_steps import bake_steps
 from .bench_phases import PhaseClock
 
 WIDTH, HEIGHT = 1920, 1080
@@ -66,6 +67,11 @@ def frame(request: dict, reporter, should_stop) -> None:
     facts["scene"] |= {"active": int((live.field.state == ACTIVE).sum()), "lights": len(snapshot.lights)}
     report({**facts, "cold_bake_seconds": live.cold_seconds, "picture": [WIDTH, HEIGHT]})
     _moves(request["moves"], live, view, ends, reporter, should_stop)
+    reporter.phase("bakes beside the interface")
+    series, longest = bake_steps(scene, grid, settings, should_stop)
+    for name, seconds in series.items():
+        report({"run": name, **spread(seconds)})
+    report({"longest_steps": longest})
     reporter.phase("where the time goes")
     _where_it_goes(snapshot, grid, settings, should_stop)
     reporter.phase("pictures")
@@ -158,11 +164,12 @@ def with_moved_light(snapshot: SceneSnapshot, step: int) -> SceneSnapshot:
 
 
 def spread(seconds: list[float]) -> dict:
-    """Median, 99th percentile, number."""
+    """Median, 99th percentile, the longest, number."""
     values = np.asarray(seconds)
     return {
         "median": float(np.median(values)),
         "percentile_99": float(np.percentile(values, 99)),
+        "longest": float(values.max()),
         "count": len(values),
     }
 

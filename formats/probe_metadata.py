@@ -15,6 +15,8 @@ from ..core.snapshot import SceneSnapshot
 
 # Of a snapshot, what light transport does not see.
 _NOT_HASHED = {"volumes", "camera", "exposure", "name", "warnings", "object_names", "frame"}
+LIGHTS, WORLD, SURFACES = "lights", "world", "surfaces"  # parts of a scene
+_PART_OF_FIELD = {"lights": LIGHTS, "world": WORLD}  # the rest are surfaces
 
 
 def program_version() -> str:
@@ -31,6 +33,17 @@ def scene_hash(snapshot: SceneSnapshot) -> str:
             digest.update(item.name.encode())
             _update(digest, getattr(snapshot, item.name))
     return digest.hexdigest()
+
+
+def part_hashes(snapshot: SceneSnapshot) -> dict[str, str]:
+    """As ``scene_hash``, of lights, world and surfaces by themselves: tells what differs between two states."""
+    digests = {part: hashlib.sha256() for part in (LIGHTS, WORLD, SURFACES)}
+    for item in dataclasses.fields(snapshot):
+        if item.name not in _NOT_HASHED:
+            digest = digests[_PART_OF_FIELD.get(item.name, SURFACES)]
+            digest.update(item.name.encode())
+            _update(digest, getattr(snapshot, item.name))
+    return {part: digest.hexdigest() for part, digest in digests.items()}
 
 
 def _update(digest, value) -> None:

@@ -18,7 +18,7 @@ from .sidebar import redraw_sidebars
 from .volume_choice import can_read_scene, chosen_volumes, has_volume, in_object_mode, volumes_of
 
 _INTERVAL_SECONDS = 0.01  # between two timer events
-_BUDGET_SECONDS = 0.03  # of work in one; a single step may take longer
+BUDGET_SECONDS = 0.03  # of work in one; a single step may take longer
 _REDRAW_SECONDS = 0.1
 
 _running: _Job | None = None
@@ -118,7 +118,7 @@ class _BakesVolumes:
         if context.mode != "OBJECT":
             job.task.stop("The bake was given up, because the mode was changed")
         job.task.check()
-        deadline = time.perf_counter() + _BUDGET_SECONDS
+        deadline = time.perf_counter() + BUDGET_SECONDS
         try:
             while time.perf_counter() < deadline:
                 next(job.task)

@@ -21,12 +21,13 @@ from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..core.steps import STEP_SECONDS, Pace
 from ..formats import probe_file
-from ..formats.probe_metadata import provenance, scene_hash
+from ..formats.probe_metadata import part_hashes, provenance
 from ..gpu_shaders.context import device_description, ensure_context
-from ..scene.field_storage import store_field
+from ..scene.field_storage import store_field, stored_metadata
 from ..scene.probe_objects import read_edits
 from ..scene.read import read_scene
 from . import kept_bakes
+from .animated import animated_states, taken_back
 from .bake_progress import Progress
 from .kept_bakes import KeptBake
 from .volume_choice import grid_of
@@ -107,15 +108,17 @@ class BakeTask:
         for grid in grids:
             probe_file.check_size(grid, self.settings.bands)
         view_layer = scene.view_layers.get(self._view_layer)
+        put_by_hand = animated_states(scene)
         try:
             snapshot = read_scene(scene, view_layer)
         except RuntimeError as error:  # Blender could not evaluate the scene at render quality now
             raise InputError(f"the scene cannot be read: {error}") from error
+        noticed = [*snapshot.warnings, *taken_back(scene, put_by_hand)]
         yield
         shown_now = read_scene(scene, view_layer, live=True)
         yield
-        shown = yield from self._pace.in_background(scene_hash, shown_now)
-        for warning in snapshot.warnings:
+        shown = yield from self._pace.in_background(part_hashes, shown_now)
+        for warning in noticed:
             self.progress.warn(warning)
         yield
         bakes: list[KeptBake] = []
@@ -126,9 +129,11 @@ class BakeTask:
         self.outcome = _in_words(results, time.perf_counter() - started)
         device = device_description()
         metadata = []
-        for result in results:
+        before = [(stored_metadata(volume) or {}).get("iterations", 0) for volume in self._find_volumes()]
+        for result, iterations_before in zip(results, before):
             warnings = [*self.progress.warnings, *result.warnings]
-            told = snapshot, result.settings or self.settings, device, result.iterations, result.converged, warnings
+            iterations = result.iterations or iterations_before  # a relight that found nothing to do leaves them
+            told = snapshot, result.settings or self.settings, device, iterations, result.converged, warnings
             metadata.append((yield from self._pace.in_background(provenance, *told)))
             if result.error:
                 metadata[-1]["error"] = result.error
@@ -163,12 +168,12 @@ class BakeTask:
         return volumes
 
     def _store(
-        self, volume: bpy.types.Object, result: BakeResult, metadata: dict, viewport_hash: str, quality: str
+        self, volume: bpy.types.Object, result: BakeResult, metadata: dict, shown: dict[str, str], quality: str
     ) -> None:
         result.field.metadata = {**result.field.metadata, **metadata}
         details = {
             "outcome": self.outcome,
-            "viewport_hash": viewport_hash,
+            "viewport_hashes": shown,
             "seconds": result.seconds,
             "longest_steps": self.longest_steps,
             "energy": [float(value) for value in result.energy],
@@ -185,7 +190,9 @@ def _by_uid(items, uid: int):
 
 def _in_words(results: list[BakeResult], seconds: float) -> str:
     active = sum(result.counts["active"] for result in results)
-    bounces = max(max(result.iterations for result in results) - 1, 0)
+    bounces = max(_bounces(result) for result in results)
+    if all(result.relit and not result.iterations for result in results):
+        return f"Nothing had changed: {active} probes keep their light"
     done = "relit" if all(result.relit for result in results) else "baked"
     text = f"{active} probes {done} in {seconds:.1f} s, light bounced {bounces} times"
     predicted = [result.error["predicted"] for result in results if result.error]
@@ -194,3 +201,9 @@ def _in_words(results: list[BakeResult], seconds: float) -> str:
     if not all(result.converged for result in results):
         text += ", some of it is still missing"
     return text
+
+
+def _bounces(result: BakeResult) -> int:
+    """The first iteration takes direct light to patches, unless bounces went on from the light before."""
+    goes_on = result.relit is not None and result.relit.warm_start
+    return max(result.iterations - (0 if goes_on else 1), 0)

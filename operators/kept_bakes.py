@@ -19,6 +19,8 @@ from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..core.steps import STEP_SECONDS, Pace, Steps
 from ..gpu_shaders.textures import wait_for_gpu
+from ..scene.probe_objects import read_edits
+from .volume_choice import grid_of
 
 
 class Relay:
@@ -93,6 +95,14 @@ def take(uid: int) -> KeptBake | None:
 
 def is_kept(uid: int) -> bool:
     return uid in _kept
+
+
+def goes_on(scene: bpy.types.Scene, volume: bpy.types.Object) -> bool:
+    """Whether a relight of ``volume`` would go on from its last bake; otherwise it bakes anew."""
+    kept = _kept.get(volume.session_uid)
+    if kept is None or scene.gridlight.error_goal() is not None:
+        return False
+    return kept.fits(grid_of(volume), scene.gridlight.bake_settings(), read_edits(scene, volume))
 
 
 @persistent

@@ -187,17 +187,18 @@ class GridlightSettings(bpy.types.PropertyGroup):
         description="Ask for an error instead of settings: face size, samples, tolerance and bands are then chosen",
         options=set(),
     )
-    target_error: FloatProperty(
+    target_error_percent: FloatProperty(
         name="Target Error",
-        description="Error of the light at probes to aim for, as a share of it: 0.02 is 2 %. The bake starts cheap, "
-        "checks itself by paths of light, refines until the target is met, and says what it reached",
-        default=0.02,
-        min=LEAST_TARGET,
-        max=MOST_TARGET,
-        soft_min=0.005,
-        soft_max=0.2,
-        step=1,
-        precision=3,
+        description="Error of the light at probes to aim for, in percent. The bake starts cheap, checks itself by "
+        "paths of light, refines until the target is met, and says what it reached",
+        default=2.0,
+        min=100 * LEAST_TARGET,
+        max=100 * MOST_TARGET,
+        soft_min=0.5,
+        soft_max=20.0,
+        subtype="PERCENTAGE",
+        step=10,
+        precision=1,
         options=set(),
     )
     custom: BoolProperty(description="Custom was chosen although the settings equal a preset", options={"HIDDEN"})
@@ -291,8 +292,8 @@ class GridlightSettings(bpy.types.PropertyGroup):
         options=set(),
     )
     memory_mib: IntProperty(
-        name="Memory",
-        description="Limit for what probes keep on the GPU during a bake, in MiB. Where it is too small, probes are "
+        name="Memory (MiB)",
+        description="Limit for what probes keep on the GPU during a bake. Where it is too small, probes are "
         "captured again for every bounce",
         default=_STANDARD.memory_mib,
         min=16,
@@ -309,7 +310,7 @@ class GridlightSettings(bpy.types.PropertyGroup):
         if not self.use_error:
             return None
         kept = {"bands"} if self.bands != _STANDARD.bands else set()
-        return ErrorGoal(float(f"{self.target_error:.6g}"), frozenset(kept))
+        return ErrorGoal(float(f"{self.target_error_percent / 100:.6g}"), frozenset(kept))
 
     def bake_settings(self) -> BakeSettings:
         """The validated settings of a bake: the one place where they are made from what the user set.

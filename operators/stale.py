@@ -12,7 +12,7 @@ import time
 import bpy
 from bpy.app.handlers import persistent
 
-from ..formats.probe_metadata import scene_hash
+from ..formats.probe_metadata import part_hashes
 from ..scene.field_storage import has_moved, stored_details, stored_text
 from ..scene.read import read_scene
 from . import names
@@ -25,7 +25,7 @@ _REST_SECONDS = 0.8  # after the last edit before the scene is read
 _QUICK_SECONDS = 0.25  # more than this is not read without being asked
 _LIGHTS_SCENE = (bpy.types.Object, bpy.types.Mesh, bpy.types.Light, bpy.types.Material, bpy.types.World)
 
-_hashes: dict[int, str] = {}  # of scenes as they are now, by session_uid
+_hashes: dict[int, dict[str, str]] = {}  # by part, of scenes as they are now, by session_uid
 _edited: set[int] = set()  # scenes that may have changed since
 _read_seconds: dict[int, float] = {}
 _last_edit = 0.0  # time.monotonic()
@@ -39,11 +39,21 @@ def state_of(scene: bpy.types.Scene, volume: bpy.types.Object) -> str:
     now = _hashes.get(scene.session_uid)
     if scene.session_uid in _edited or now is None:
         return EDITED
-    return FRESH if stored_details(volume).get("viewport_hash") == now else STALE
+    return STALE if _differing(volume, now) else FRESH
+
+
+def changed_parts(scene: bpy.types.Scene, volume: bpy.types.Object) -> set[str]:
+    """What of ``scene`` (``probe_metadata.LIGHTS`` …) is not as it was when the light of a STALE volume was baked."""
+    return _differing(volume, _hashes.get(scene.session_uid, {}))
+
+
+def _differing(volume: bpy.types.Object, now: dict[str, str]) -> set[str]:
+    baked = stored_details(volume).get("viewport_hashes", {})
+    return {part for part, value in now.items() if baked.get(part) != value}
 
 
 def compare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
-    """Reads ``scene`` and remembers its hash."""
+    """Reads ``scene`` and remembers its hashes."""
     started = time.perf_counter()
     global _reading
     _reading = True
@@ -51,7 +61,7 @@ def compare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
         snapshot = read_scene(scene, view_layer, live=True)
     finally:
         _reading = False
-    _hashes[scene.session_uid] = scene_hash(snapshot)
+    _hashes[scene.session_uid] = part_hashes(snapshot)
     _edited.discard(scene.session_uid)
     _read_seconds[scene.session_uid] = time.perf_counter() - started
     redraw_sidebars()

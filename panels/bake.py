@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import bpy
 
+from ..formats.probe_metadata import LIGHTS, WORLD
 from ..operators import names
 from ..operators.bake import last_failure, running_task
+from ..operators.kept_bakes import goes_on
 from ..operators.quality import QUALITIES
-from ..operators.stale import EDITED, STALE, state_of
+from ..operators.stale import EDITED, STALE, changed_parts, state_of
 from ..operators.volume_choice import active_volume, volumes_of
 from ..scene.field_storage import has_moved, stored_details, stored_metadata
 from .sidebar_panel import SidebarPanel, paragraph
@@ -27,7 +29,7 @@ class GRIDLIGHT_PT_bake(SidebarPanel, bpy.types.Panel):
         row.prop(settings, "use_error", text="")
         target = row.row(align=True)
         target.active = settings.use_error
-        target.prop(settings, "target_error")
+        target.prop(settings, "target_error_percent")
         task = running_task()
         row = layout.row()
         row.active = False
@@ -36,9 +38,9 @@ class GRIDLIGHT_PT_bake(SidebarPanel, bpy.types.Panel):
         elif settings.use_error:
             row.label(text="Settings are chosen for this error")
         elif quality:
-            row.label(text=f"{quality.error_percent:.1f} % from path tracing in the gallery")
+            row.label(text=f"Measured: {quality.error_percent:.1f} % off path tracing")
         else:
-            row.label(text="Error not measured in advance")
+            row.label(text="Error of these settings: not measured")
         row = layout.row(align=True)
         row.scale_y = 1.5
         if task is not None:
@@ -66,8 +68,8 @@ class GRIDLIGHT_PT_bake_settings(SidebarPanel, bpy.types.Panel):
         column.prop(settings, "face")
         column.prop(settings, "samples")
         column.prop(settings, "gather")
-        column = layout.column()
-        column.prop(settings, "bounces_auto")
+        column = layout.column(heading="Bounces")
+        column.prop(settings, "bounces_auto", text="Until Settled")
         if settings.bounces_auto:
             column.prop(settings, "tolerance")
         else:
@@ -105,16 +107,30 @@ def _state(layout, context) -> None:
     state = state_of(context.scene, volume)
     row = layout.row()
     if has_moved(volume):
-        paragraph(row, context, "The volume has changed since its light was baked. Bake again", "ERROR")
+        paragraph(row, context, "The volume has changed since the bake. Bake again", "ERROR", buttons=1)
     elif state == STALE:
-        paragraph(row, context, "The scene has changed since this light was baked. Bake again", "ERROR")
+        remedy = "Relight" if goes_on(context.scene, volume) else "Bake again"
+        paragraph(row, context, f"{_what_changed(context.scene, volume)} since the bake. {remedy}", "ERROR", buttons=1)
     elif state == EDITED:
-        row.label(text="Edited", icon="QUESTION")  # since the bake; more does not fit beside the button
-        row.operator(names.CHECK_BAKE)
+        row.label(text="Edited since the bake", icon="QUESTION")
     else:
         row.label(text="The light is up to date", icon="CHECKMARK")
     row.operator(names.CLEAR_BAKE, text="", icon="TRASH")
+    if state == EDITED:
+        layout.operator(names.CHECK_BAKE, icon="FILE_REFRESH")
     paragraph(layout, context, last_failure() or stored_details(volume).get("outcome", ""), "BLANK1")
+    warnings = len(metadata.get("warnings", []))
+    if warnings:
+        text = "1 warning: see Report" if warnings == 1 else f"{warnings} warnings: see Report"
+        layout.label(text=text, icon="ERROR")
+
+
+def _what_changed(scene, volume) -> str:
+    parts = changed_parts(scene, volume)
+    for part, text in ((LIGHTS, "Lights have changed"), (WORLD, "The world has changed")):
+        if parts == {part}:
+            return text
+    return "The scene has changed"
 
 
 classes = (GRIDLIGHT_PT_bake, GRIDLIGHT_PT_bake_settings)

@@ -10,7 +10,8 @@ from ..operators.names import CATEGORY
 
 _FONT = 0  # the interface's own
 _LETTER_POINTS = 11
-_MARGIN, _ICON = 50, 22  # pixels at scale 1: what panels keep free at their sides, and what an icon takes
+# Pixels at scale 1: what panels keep free at their sides, what an icon takes, and a button that shows no more than one.
+_MARGIN, _ICON, _BUTTON = 50, 22, 32
 
 
 class SidebarPanel:
@@ -21,10 +22,13 @@ class SidebarPanel:
     bl_category = CATEGORY
 
 
-def paragraph(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
-    """``text`` in as many lines as the sidebar's width asks for; labels do not wrap by themselves."""
+def paragraph(
+    layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE", buttons: int = 0
+) -> None:
+    """``text`` in as many lines as the sidebar's width asks for; labels do not wrap by themselves. ``buttons``: that
+    follow in the same row, each with an icon alone."""
     scale = context.preferences.system.ui_scale
-    width = context.region.width - scale * (_MARGIN + (_ICON if icon != "NONE" else 0))
+    width = context.region.width - scale * (_MARGIN + (_ICON if icon != "NONE" else 0) + _BUTTON * buttons)
     blf.size(_FONT, _LETTER_POINTS * scale)
     column = layout.column(align=True)
     column.scale_y = 0.8

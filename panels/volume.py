@@ -74,6 +74,9 @@ def _list(column, volumes, active) -> None:
 
 def _grid(layout, volume) -> None:
     grid = volume.gridlight_grid
+    title = layout.row()
+    title.active = False
+    title.label(text="Probes along each axis of the box")
     row = layout.row(align=True)
     for axis in range(3):
         row.prop(grid, "resolution", index=axis, text="XYZ"[axis])

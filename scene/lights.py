@@ -101,17 +101,18 @@ def is_dynamic(item: bpy.types.Object) -> bool:
     """Whether the light may move or change between frames: marked so by its role, or animated itself or by a parent."""
     if item.get(ROLE_PROPERTY) == "dynamic":
         return True
-    if _animated(item.data) or _animated(item.data.node_tree):
+    if is_animated(item.data) or is_animated(item.data.node_tree):
         return True
     while item is not None:
-        if _animated(item) or any(not constraint.mute for constraint in item.constraints):
+        if is_animated(item) or any(not constraint.mute for constraint in item.constraints):
             return True
         item = item.parent
     return False
 
 
-def _animated(block) -> bool:
-    animation = block.animation_data if block is not None else None
+def is_animated(block: bpy.types.ID | None) -> bool:
+    """Whether a datablock has an animation of its own."""
+    animation = getattr(block, "animation_data", None)  # not all kinds of data can have one
     return animation is not None and bool(animation.action or animation.drivers or animation.nla_tracks)
 
 

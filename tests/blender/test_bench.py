@@ -166,11 +166,13 @@ def test_error_over_time_of_a_room(run_gridlight, tmp_path):
 def test_frame_says_where_the_time_goes():
     reports = children({"peer": "frame", "scene": "cornell", "seconds": 60, "moves": 3, "settings": {"face": 8}})
     rows = {report["run"]: report for report in reports if "run" in report}
-    assert {"slice", "relight, sliced", "picture", "relight, in one go"} <= set(rows)
+    assert {"slice", "relight, sliced", "picture", "relight, in one go", "bake, step", "bake, timer event"} <= set(rows)
     for row in rows.values():
-        assert 0 < row["median"] <= row["percentile_99"]
+        assert 0 < row["median"] <= row["percentile_99"] <= row["longest"]
+    assert rows["bake, step"]["count"] >= rows["bake, timer event"]["count"] > 10
     assert rows["slice"]["count"] > rows["relight, sliced"]["count"]
     merged = {key: value for report in reports for key, value in report.items()}
+    assert max(merged["longest_steps"].values()) == rows["bake, step"]["longest"]
     shaders = merged["shaders"]
     assert {"patch_direct_comp", "patch_iterate_comp", "field_project_comp"} <= set(shaders)
     assert sum(cost["seconds"] for cost in shaders.values()) < merged["profiled_seconds"]

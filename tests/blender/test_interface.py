@@ -10,7 +10,7 @@ from gridlight.core.grid import Grid
 from gridlight.core.settings import BakeSettings
 from gridlight.formats import probe_file
 from gridlight.scene import probe_objects
-from gridlight.scene.field_storage import load_field, stored_counts, stored_details
+from gridlight.scene.field_storage import load_field, stored_counts, stored_details, stored_metadata
 from gridlight.scene.volumes import create_volume
 
 
@@ -133,7 +133,7 @@ def test_bake_is_in_the_file_after_saving_and_loading(room, gpu_context, tmp_pat
 def test_a_target_error_is_baked_for_and_what_was_reached_is_told(room, gpu_context):
     settings = bpy.context.scene.gridlight
     assert settings.error_goal() is None
-    settings.use_error, settings.target_error = True, 0.2
+    settings.use_error, settings.target_error_percent = True, 20.0
     assert settings.error_goal() == ErrorGoal(0.2)
     assert bpy.ops.gridlight.bake() == {"FINISHED"}
     baked = load_field(room)
@@ -281,6 +281,36 @@ def test_relight_with_other_settings_is_a_bake(room, gpu_context):
     bpy.context.scene.gridlight.bands = 2
     bpy.ops.gridlight.relight()
     assert load_field(room).bands == 2
+
+
+def test_a_relight_without_changes_says_so(room, gpu_context):
+    """Not that light bounced no times; and what was known of the bake stays."""
+    bpy.ops.gridlight.bake()
+    iterations = stored_metadata(room)["iterations"]
+    bpy.ops.gridlight.relight()
+    assert "Nothing had changed" in stored_details(room)["outcome"]
+    assert stored_metadata(room)["iterations"] == iterations > 1
+
+
+def test_an_animated_lamp_moved_by_hand_goes_back_and_that_is_said(room, gpu_context):
+    """As in a render; light and lamp then agree."""
+    lamp = bpy.data.objects["Point"]
+    lamp.keyframe_insert("location", frame=1)
+    place = lamp.location.copy()
+    bpy.ops.gridlight.bake()
+    assert not stored_metadata(room)["warnings"]
+    baked = load_field(room).coefficients
+    lamp.location.x -= 1.0
+    bpy.ops.gridlight.relight()
+    (warning,) = stored_metadata(room)["warnings"]
+    assert "'Point' is animated and was changed by hand" in warning and "keyframe" in warning
+    assert lamp.location == place and np.array_equal(load_field(room).coefficients, baked)
+    lamp.location.x -= 1.0
+    lamp.keyframe_insert("location", frame=1)
+    bpy.ops.gridlight.relight()
+    assert not stored_metadata(room)["warnings"] and "relit" in stored_details(room)["outcome"]
+    assert lamp.location.x == place.x - 1.0
+    assert np.abs(load_field(room).coefficients - baked).max() > 0.05 * np.abs(baked).max()
 
 
 def test_nothing_is_kept_with_another_file(room, gpu_context):

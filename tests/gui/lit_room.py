@@ -40,6 +40,14 @@ def store_uniform(person, volume, radiance):
     person.module("viewport").field_changed(volume)
 
 
+def switch(**settings):
+    """Sets the preview's properties; returns them."""
+    preview = bpy.context.scene.gridlight.preview
+    for name, value in settings.items():
+        setattr(preview, name, value)
+    return preview
+
+
 def view(person, distance=2.0, rotation=(0.8, 0.35, 0.2, 0.4)):
     """Looks into the room with nothing on top of the picture."""
     space = person.area().spaces.active

@@ -10,7 +10,7 @@ import contextlib
 import os
 import re
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,7 +22,8 @@ EXTENSION = "bl_ext.user_default.gridlight"
 READING_SCALE = 3  # letters of the interface are 8 to 11 pixels high; text recognition wants about 30
 # Grey levels that become white and black for reading: of bright letters on anything, of dim ones on dark ground.
 LEVELS = ("45%,85%", "20%,75%")
-LOOKS = 6  # at the screen before a person gives up looking for something
+LOOKS = 12  # at the screen before a person gives up looking for something
+CLOSED_PIXELS = 8  # regions that are closed are this wide at most
 REACTION_SECONDS = 0.25  # between a click and what it shows
 LAST_TIMER_SECONDS = 8.0  # a file's light is compared with its scene a moment after the last edit
 
@@ -48,6 +49,7 @@ class Person:
         self._scenario = scenario
         self._handlers = leaks.application_handlers(EXTENSION)
         self._on_gpu = leaks.gpu_objects()
+        self._open_panels = ["Volume", "Bake", "Preview", "Export"]
         self.clicks = 0
 
     # Blender's side
@@ -150,13 +152,28 @@ class Person:
                     return Rectangle(first.x, first.y, last.x + last.width - first.x, first.height)
         return None
 
-    def below(self, text: str) -> Rectangle:
-        """The sidebar from below ``text`` on: titles of panels often say the same as buttons in them."""
-        sidebar = self.rectangle(self.region("UI"))
-        place = self.find(text, sidebar)
-        assert place, f"'{text}' is not in the sidebar"
-        top = place.y + place.height + 4
+    def below(self, text: str) -> Iterator[float]:
+        """Looks for ``text`` in the sidebar; returns the sidebar from below it on: titles of panels often say the same
+        as buttons in them."""
+        place = yield from self._search(text, self._sidebar)
+        sidebar, top = self._sidebar(), place.y + place.height + 4
         return Rectangle(sidebar.x, top, sidebar.width, sidebar.y + sidebar.height - top)
+
+    def _sidebar(self) -> Rectangle:
+        return self.rectangle(self.region("UI"))
+
+    def _search(self, text: str, where: Callable[[], Rectangle]) -> Iterator[float]:
+        """Looks again and again until ``text`` is found; returns where it stands. ``where`` is asked at every look:
+        regions open and grow meanwhile."""
+        for _ in range(LOOKS):
+            rectangle = where()
+            place = self.find(text, rectangle) if rectangle.width > CLOSED_PIXELS else None
+            if place is not None:
+                return place
+            yield 2 * REACTION_SECONDS
+        self.picture("unread")
+        seen = " ".join(word for word, _ in self.read(rectangle))
+        raise AssertionError(f"'{text}' is not on the screen at {rectangle}; what is: {seen}")
 
     # Hands
     # ------------------------------------------------------------------------------------------------------------------
@@ -179,7 +196,7 @@ class Person:
     def settle(self) -> Iterator[float]:
         """Waits until the sidebar stands still: panels open and close in motion."""
         before = None
-        for _ in range(LOOKS):
+        for _ in range(LOOKS // 2):
             seen = self.look(self.rectangle(self.region("UI")))
             if before is not None and seen.shape == before.shape and (seen == before).all():
                 return
@@ -188,17 +205,16 @@ class Person:
 
     def click_text(self, text: str, rectangle: Rectangle | None = None) -> Iterator[float]:
         """Reads the screen until ``text`` is found and clicks it. By default in the 3D viewport's sidebar."""
-        rectangle = rectangle or self.rectangle(self.region("UI"))
-        for _ in range(LOOKS):
-            place = self.find(text, rectangle)
-            if place is not None:
-                break
-            yield 2 * REACTION_SECONDS
-        else:
-            self.picture("unread")
-            seen = " ".join(word for word, _ in self.read(rectangle))
-            raise AssertionError(f"'{text}' is not on the screen at {rectangle}; what is: {seen}")
+        place = yield from self._search(text, (lambda: rectangle) if rectangle else self._sidebar)
         yield from self.click(*place.center)
+
+    def only_panel(self, title: str) -> Iterator[float]:
+        """Opens the sidebar's panel ``title`` and closes all others, by clicks on their titles."""
+        for other in [name for name in self._open_panels if name != title]:
+            yield from self.click_text(other)
+        if title not in self._open_panels:
+            yield from self.click_text(title)
+        self._open_panels = [title]
 
     def scroll(self, lines: int, rectangle: Rectangle | None = None) -> Iterator[float]:
         """Turns the wheel over a part of the screen, by default the sidebar; positive: down."""

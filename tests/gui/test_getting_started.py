@@ -41,7 +41,7 @@ def test_the_guide_word_by_word(person, _case):
     person.picture("gallery")
     # 3. Bake
     bake = person.module("operators.bake")
-    yield from person.click_text(guide.next_label("Bake"), person.below("path tracing"))
+    yield from person.click_text(guide.next_label("Bake"), (yield from person.below("path tracing")))
     yield from person.wait_until(lambda: bake.running_task() is None, "the bake", 200)
     counts = person.module("scene.field_storage").stored_counts(bpy.data.objects["Gallery Volume"])
     assert counts["active"] > 250 and counts["culled"] > 0
@@ -52,7 +52,7 @@ def test_the_guide_word_by_word(person, _case):
     person.picture("baked")
     # 4. Look
     before = person.look(person.rectangle()).astype(float)
-    yield from person.click_text(guide.next_label("Preview"), person.below("Preview"))
+    yield from person.click_text(guide.next_label("Preview"), (yield from person.below("Preview")))
     assert scene.gridlight.preview.enabled and scene.gridlight.preview.live
     views = person.module("viewport.handlers")
     sessions = person.module("viewport.sessions")
@@ -84,7 +84,7 @@ def test_the_guide_word_by_word(person, _case):
     after = person.look(person.rectangle()).astype(float)
     assert np.abs(after - shown)[:, : shown.shape[1] // 2].mean() > 0.5
     person.picture("moved")
-    yield from person.click_text(guide.next_label("Relight"), person.below("path tracing"))
+    yield from person.click_text(guide.next_label("Relight"), (yield from person.below("path tracing")))
     yield from person.wait_until(lambda: bake.running_task() is None, "the relight", 120)
     yield 1.0
     if not person.find("up to date", sidebar):  # reading the scene took long, and the panel asks before it does so
@@ -96,7 +96,7 @@ def test_the_guide_word_by_word(person, _case):
     folder = Path(bpy.app.tempdir) / "guide"
     scene.gridlight.export.directory = str(folder)
     yield from person.scroll(10)
-    yield from person.click_text(guide.next_label("Export"), person.below("Folder"))
+    yield from person.click_text(guide.next_label("Export"), (yield from person.below("Folder")))
     yield 1.0
     assert (folder / "probes.exr").stat().st_size > 10_000
     # 7. Your own scene

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every mode of the preview beside the picture of it that is kept in tests/images, on both backends; and one picture,
-whether draw handler, render engine or the pictures of the command line draw it."""
+"""Every mode of the preview, Explore mode and the report beside the pictures of them that are kept in tests/images, on
+both backends; and one picture, whether draw handler, render engine or the pictures of the command line draw it."""
 
 import bpy
 import lit_room
@@ -98,3 +98,44 @@ def test_engine_and_command_line_draw_the_same_picture(person):
     if not reference.is_blessing():
         reference.check("preview_full", engine)
         reference.check("preview_full", traced)
+
+
+@in_blender(timeout=180.0)
+def test_explore_mode_is_like_its_picture(person):
+    """The list of keys over the light, from where the view stood."""
+    build(person)
+    assert person.do("gridlight.explore", invoke=True) == {"RUNNING_MODAL"}
+    try:
+        yield from lit_room.drawn(person)
+        explore = person.module("operators.explore")._running[0]
+        yield from person.key("F1")
+        yield from person.wait_until(lambda: explore._overlay.help_is_open, "the list of keys")
+        yield from person.wait_until(lambda: not explore._overlay.is_fading, "the end of the first words")
+        yield from lit_room.drawn(person)
+        person.picture("help", person.rectangle())
+        reference.check("explore_help", seen(person))
+    finally:
+        person.module("operators.explore").stop_running()
+
+
+@in_blender(timeout=180.0)
+def test_report_panel_is_like_its_picture(person):
+    build(person)
+    volume = bpy.data.objects["Room"]
+    storage = person.module("scene.field_storage")
+    field = storage.load_field(volume)
+    field.metadata |= {
+        "iterations": 9,
+        "converged": True,
+        "scene": {"frame": 1},
+        "warnings": ["material 'Chrome' is metal: it reflects in all directions"],
+    }
+    seconds = {"read": 0.02, "cull": 0.01, "capture": 0.42, "light": 0.31}
+    storage.store_field(volume, field, "known light", {"seconds": seconds})
+    yield from person.open_tab()
+    yield from person.only_panel("Report")
+    person.move(3, 3)
+    yield from person.settle()
+    sidebar = person.rectangle(person.region("UI"))
+    person.picture("report", sidebar)
+    reference.check("report_panel", reference.coarse(person.look(sidebar)))

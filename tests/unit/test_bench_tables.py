@@ -101,17 +101,19 @@ def test_frame_tells_bandwidth_only_where_it_is_not_lost_in_waiting():
         "cold_bake_seconds": 1.0,
         "cold_picture_seconds": None,
         "rows": [
-            {"run": "slice", "median": 2e-3, "percentile_99": 3e-3, "count": 7},
+            {"run": "slice", "median": 2e-3, "percentile_99": 3e-3, "longest": 4e-3, "count": 7},
             {
                 "run": "relight, in one go",
                 "median": 5e-3,
                 "percentile_99": 6e-3,
+                "longest": 7e-3,
                 "count": 3,
                 "phases": {"field": 1e-3},
                 "patches": 99,
                 "iterations": 8,
             },
         ],
+        "longest_steps": {"capture": 2.5e-3},
         "limits": {"copy_bytes_per_second": 1e12, "operations_per_second": 5e13, "wait_seconds": 1e-5},
         "profiled_seconds": 6e-3,
         # 1 ms for 0.5 GB after two waits of 10 µs: half of the bandwidth
