@@ -21,7 +21,7 @@ STORED = "irradiance / pi of surfaces facing +X, -X, +Y, -Y, +Z, -Z"
 RUN_IN_ENGINE = False
 DOES_NOT_CARRY = [
     "visibility weights: light leaks through walls thinner than a cell",
-    "gradients of probes: between probes light is blended straight, which is coarser than eval",
+    "gradients of probes: between probes light is blended straight, coarser than in the preview",
     "what lies between the six sides: a normal that is none of the axes sees a blend of three",
     "negative irradiance, where the series rings: cut at zero",
     "light outside the box of cells",

@@ -25,7 +25,7 @@ STORED = "radiance coefficients / pi, orthonormal; the shader applies the cosine
 RUN_IN_ENGINE = False
 DOES_NOT_CARRY = [
     "visibility weights: light leaks through walls thinner than a cell",
-    "gradients of probes: between probes light is blended straight, which is coarser than eval",
+    "gradients of probes: between probes light is blended straight, coarser than in the preview",
     "trilinear interpolation: Godot blends four probes of a tetrahedron",
     "light per pixel: Godot looks the probes up once per object, at its centre; static meshes need lightmaps",
     "light outside the volume",

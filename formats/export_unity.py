@@ -22,7 +22,7 @@ STORED = "SphericalHarmonicsL2: irradiance / pi with the basis functions' consta
 RUN_IN_ENGINE = False
 DOES_NOT_CARRY = [
     "visibility weights: light leaks through walls thinner than a cell",
-    "gradients of probes: between probes light is blended straight, which is coarser than eval",
+    "gradients of probes: between probes light is blended straight, coarser than in the preview",
     "trilinear interpolation: Unity blends four probes of its own tetrahedra",
     "light per pixel: Unity looks light probes up once per renderer, except with proxy volumes",
 ]

@@ -23,9 +23,9 @@ from ..core.steps import STEP_SECONDS, Pace
 from ..formats import probe_file
 from ..formats.probe_metadata import part_hashes, provenance
 from ..gpu_shaders.context import device_description, ensure_context
-from ..scene.field_storage import store_field, stored_metadata
+from ..scene.field_storage import store_field, stored_details, stored_metadata
 from ..scene.probe_objects import read_edits
-from ..scene.read import read_scene
+from ..scene.read import read_in_steps
 from . import kept_bakes
 from .animated import animated_states, taken_back
 from .bake_progress import Progress
@@ -98,25 +98,21 @@ class BakeTask:
         self.progress.phase("read")
         yield  # the first picture of the progress comes before the first work
         ensure_context()
-        scene = _by_uid(bpy.data.scenes, self._scene)
-        if scene is None:
-            raise InputError("the scene is gone")
+        scene = self._find_scene()
         volumes = self._find_volumes()
         grids = [grid_of(volume) for volume in volumes]
         quality = scene.gridlight.quality
         edits = [read_edits(scene, volume) for volume in volumes]
         for grid in grids:
             probe_file.check_size(grid, self.settings.bands)
-        view_layer = scene.view_layers.get(self._view_layer)
         put_by_hand = animated_states(scene)
         try:
-            snapshot = read_scene(scene, view_layer)
+            snapshot = yield from read_in_steps(scene, scene.view_layers.get(self._view_layer))
         except RuntimeError as error:  # Blender could not evaluate the scene at render quality now
             raise InputError(f"the scene cannot be read: {error}") from error
+        scene = self._find_scene()
         noticed = [*snapshot.warnings, *taken_back(scene, put_by_hand)]
-        yield
-        shown_now = read_scene(scene, view_layer, live=True)
-        yield
+        shown_now = yield from read_in_steps(scene, scene.view_layers.get(self._view_layer), live=True)
         shown = yield from self._pace.in_background(part_hashes, shown_now)
         for warning in noticed:
             self.progress.warn(warning)
@@ -155,6 +151,17 @@ class BakeTask:
         yield from fresh.bake()
         return fresh
 
+    def _find_scene(self) -> bpy.types.Scene:
+        """The scene as it is now.
+
+        Raises:
+            InputError: it was deleted.
+        """
+        scene = _by_uid(bpy.data.scenes, self._scene)
+        if scene is None:
+            raise InputError("the scene is gone")
+        return scene
+
     def _find_volumes(self) -> list[bpy.types.Object]:
         """The volumes as they are now; undo and renaming may have moved them.
 
@@ -173,6 +180,7 @@ class BakeTask:
         result.field.metadata = {**result.field.metadata, **metadata}
         details = {
             "outcome": self.outcome,
+            "bounces": _bounces(result) if result.iterations else stored_details(volume).get("bounces", 0),
             "viewport_hashes": shown,
             "seconds": result.seconds,
             "longest_steps": self.longest_steps,

@@ -11,6 +11,7 @@ import numpy as np
 
 from . import explore_actions as actions
 from . import names
+from .volume_choice import in_object_mode
 
 _TURN_PER_PIXEL = math.radians(0.15)
 _TIMER_SECONDS = 1 / 60
@@ -57,7 +58,10 @@ class GRIDLIGHT_OT_explore(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return context.area is not None and context.area.type == "VIEW_3D" and context.mode == "OBJECT"
+        if context.area is None or context.area.type != "VIEW_3D":
+            cls.poll_message_set("Explore mode starts in a 3D viewport")
+            return False
+        return in_object_mode(cls, context)
 
     def invoke(self, context, event):
         from ..viewport import walk  # draws, so only where there is a view

@@ -29,7 +29,7 @@ class GRIDLIGHT_PT_report(SidebarPanel, bpy.types.Panel):
 
 def _figures(layout, context, metadata: dict, details: dict) -> None:
     rows = [
-        ("Iterations", str(metadata.get("iterations", "–"))),
+        ("Bounces", str(details.get("bounces", "–"))),
         ("Settled", "yes" if metadata.get("converged") else "no, some light is still missing"),
         ("Frame", str(metadata.get("scene", {}).get("frame", "–"))),
     ]

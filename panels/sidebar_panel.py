@@ -11,7 +11,7 @@ from ..operators.names import CATEGORY
 _FONT = 0  # the interface's own
 _LETTER_POINTS = 11
 # Pixels at scale 1: what panels keep free at their sides, what an icon takes, and a button that shows no more than one.
-_MARGIN, _ICON, _BUTTON = 50, 22, 32
+_MARGIN, _ICON, _BUTTON = 58, 22, 32
 
 
 class SidebarPanel:

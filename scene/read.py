@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
+from ..core.errors import InputError
 from ..core.snapshot import Light, SceneSnapshot, World
+from ..core.steps import Steps, run
 from .camera import read_camera
 from .evaluation import as_in_viewport, at_render_quality, rendered_objects
 from .geometry import MeshArrays, WorldTriangles, place, read_mesh
@@ -83,10 +85,27 @@ def read_scene(
     if moved:
         scene.frame_set(frame)
     try:
-        return _read(scene, view_layer, as_in_viewport if live else at_render_quality)
+        return run(_read(scene, view_layer, as_in_viewport if live else at_render_quality))
     finally:
         if moved:
             scene.frame_set(own_frame, subframe=own_subframe)
+
+
+def read_in_steps(
+    scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer | None = None, *, live: bool = False
+) -> Steps[SceneSnapshot]:
+    """``read_scene`` in steps: in the first one Blender evaluates the scene and its arrays are copied, in the others
+    follow materials, mesh by mesh.
+
+    Raises:
+        InputError: something of it was deleted between two steps.
+        RuntimeError: as ``read_scene``.
+    """
+    try:
+        view_layer = view_layer or scene.view_layers[0]
+        return (yield from _read(scene, view_layer, as_in_viewport if live else at_render_quality))
+    except ReferenceError as error:  # how Blender tells that a datablock is gone
+        raise InputError("something was deleted while the scene was read; bake again") from error
 
 
 def read_evaluated(depsgraph: bpy.types.Depsgraph, world: World) -> SceneSnapshot:
@@ -94,7 +113,7 @@ def read_evaluated(depsgraph: bpy.types.Depsgraph, world: World) -> SceneSnapsho
 
     ``world`` is the background, which may take a render to find out.
     """
-    return _read(depsgraph.scene, depsgraph.view_layer, lambda _scene, _layer, visit: visit(depsgraph), world)
+    return run(_read(depsgraph.scene, depsgraph.view_layer, lambda _scene, _layer, visit: visit(depsgraph), world))
 
 
 def read_lights(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Light]:
@@ -112,13 +131,21 @@ def read_lights(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list
     return lights.lights
 
 
-def _read(scene, view_layer, evaluate, world: World | None = None) -> SceneSnapshot:
+def _read(scene, view_layer, evaluate, world: World | None = None) -> Steps[SceneSnapshot]:
     notices = Notices()
     harvest = evaluate(
         scene,
         view_layer,
         lambda depsgraph: _harvest(depsgraph, rendered_objects(view_layer), scene.rigidbody_world is not None, notices),
     )
+    about = {
+        "volumes": find_volumes(scene),
+        "camera": read_camera(scene),
+        "exposure": float(scene.view_settings.exposure),
+        "frame": scene.frame_current,
+        "name": scene.name,
+    }
+    yield
     images = ImageTable(notices)
     surfaces = SurfaceParts()
     # Inside a render engine's callback Cycles cannot be asked, and so no atlas be filled.
@@ -134,21 +161,21 @@ def _read(scene, view_layer, evaluate, world: World | None = None) -> SceneSnaps
         object_names += group.names
         if part is not None:
             parts.append(part)
+        yield
     lights = LightTable(images, notices, measures=world is None)
     for item, matrix, name in harvest.lights:
         lights.add(item, matrix, name)
+    yield
+    background = world or read_world(scene, notices)
+    yield
     return SceneSnapshot(
         **_joined(parts),
+        **about,
         object_names=object_names,
         materials=materials.materials,
         images=images.images,
         lights=lights.lights,
-        world=world or read_world(scene, notices),
-        volumes=find_volumes(scene),
-        camera=read_camera(scene),
-        exposure=float(scene.view_settings.exposure),
-        frame=scene.frame_current,
-        name=scene.name,
+        world=background,
         warnings=notices.lines(),
     )
 

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 
 import bpy
 
-LISTEN_SECONDS = 0.3  # for events of timers; every timer of the extension is quicker than a tenth of a second
+LISTEN_SECONDS = 0.15  # for events of timers; every timer of the extension is quicker than a tenth of a second
 _KEPT_ON_PURPOSE = {"GPUShader"}  # for the session: docs/architecture.md
 
 
@@ -83,7 +83,7 @@ def event_timers() -> Iterator[float]:
         _Listener.is_over = True  # with the next event, which timers of this function's own send
         manager = bpy.context.window_manager
         ends = [manager.event_timer_add(0.01, window=window) for window in manager.windows]
-        yield 0.1
+        yield LISTEN_SECONDS
         for timer in ends:
             manager.event_timer_remove(timer)
     finally:

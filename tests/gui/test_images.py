@@ -114,6 +114,7 @@ def test_explore_mode_is_like_its_picture(person):
         yield from lit_room.drawn(person)
         person.picture("help", person.rectangle())
         reference.check("explore_help", seen(person))
+        yield from person.key("Escape")
     finally:
         person.module("operators.explore").stop_running()
 
@@ -125,13 +126,12 @@ def test_report_panel_is_like_its_picture(person):
     storage = person.module("scene.field_storage")
     field = storage.load_field(volume)
     field.metadata |= {
-        "iterations": 9,
         "converged": True,
         "scene": {"frame": 1},
         "warnings": ["material 'Chrome' is metal: it reflects in all directions"],
     }
     seconds = {"read": 0.02, "cull": 0.01, "capture": 0.42, "light": 0.31}
-    storage.store_field(volume, field, "known light", {"seconds": seconds})
+    storage.store_field(volume, field, "known light", {"seconds": seconds, "bounces": 8})
     yield from person.open_tab()
     yield from person.only_panel("Report")
     person.move(3, 3)
