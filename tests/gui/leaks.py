@@ -70,7 +70,8 @@ def gpu_objects() -> Counter:
 def event_timers() -> Iterator[float]:
     """Listens for events of window-manager timers (``event_timer_add``) in every window; returns how many came.
 
-    Such timers cannot be listed, but each sends TIMER events until it is removed. Blender's own send other types.
+    Such timers cannot be listed, but each sends TIMER events until it is removed. Blender's own, those of
+    tooltips apart, send other types.
     """
     _Listener.heard, _Listener.is_over = 0, False
     bpy.utils.register_class(_Listener)

@@ -104,6 +104,8 @@ def test_engine_and_command_line_draw_the_same_picture(person):
 def test_explore_mode_is_like_its_picture(person):
     """The list of keys over the light, from where the view stood."""
     build(person)
+    person.move(*person.rectangle().center)  # where keys are pressed: the mouse turns the view
+    yield 0.5
     assert person.do("gridlight.explore", invoke=True) == {"RUNNING_MODAL"}
     try:
         yield from lit_room.drawn(person)

@@ -7,6 +7,7 @@ import bpy
 import lit_room
 import numpy as np
 from harness import in_blender
+from person import Rectangle
 
 
 @in_blender()
@@ -71,9 +72,9 @@ def test_f12_renders_while_the_preview_goes_on(person):
 
 
 @in_blender()
-def test_f12_writes_an_image_under_blenders_colour_management(person):
-    """The key; then the file that the operator writes. Blender brings plain colours of the known light to the same view
-    by itself: that is what the image must show."""
+def test_a_rendered_image_is_under_blenders_colour_management(person):
+    """Rendered from the menu; then the file that the operator writes. Blender brings plain colours of known light to
+    the same view by itself: that is what the image must show."""
     lit_room.build(person)
     scene = bpy.context.scene
     scene.camera.location = (0, 0, 0)
@@ -88,18 +89,19 @@ def test_f12_writes_an_image_under_blenders_colour_management(person):
     seen = []
     bpy.app.handlers.render_complete.append(lambda *_: seen.append(True))
     try:
-        yield from person.key("F12")
+        yield from person.click_text("Render", Rectangle(0, 0, 600, 30))
+        yield from person.click_text("Render Image", Rectangle(100, 20, 400, 200))
         yield from person.wait_until(lambda: seen, "the image", 60)
     finally:
         bpy.app.handlers.render_complete.pop()
-    path = os.path.join(bpy.app.tempdir, "f12.png")
+    path = os.path.join(bpy.app.tempdir, "rendered.png")
     bpy.data.images["Render Result"].save_render(path)
     shown = pixels_of(path)
     known.save_render(path, scene=scene)
     expected = pixels_of(path)
     assert 10 < 255 * np.ptp(expected[0, 0]), "the view must tell colours apart"
     assert 255 * np.abs(shown - expected).max() <= 1.5, (255 * shown[0, 0], 255 * expected[0, 0])
-    scene.render.filepath = os.path.join(bpy.app.tempdir, "f12.exr")
+    scene.render.filepath = os.path.join(bpy.app.tempdir, "rendered.exr")
     scene.render.image_settings.file_format = "OPEN_EXR"
     scene.render.image_settings.color_depth = "32"
     with person.at_viewport():
