@@ -16,8 +16,9 @@ def leave_at_once(_number, _frame):
 
 
 if __name__ == "__main__":
-    # Set first and explicitly: a shell starts background jobs with it ignored, and `kill -INT` is to work on them too.
+    # Set first and explicitly: a shell starts background jobs with SIGINT ignored, and `kill -INT` is to work on them.
     signal.signal(signal.SIGINT, leave_at_once)
+    signal.signal(signal.SIGTERM, leave_at_once)
 
 import importlib.util
 import sys

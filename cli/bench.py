@@ -7,6 +7,7 @@ only itself. A benchmark is a module ``bench_NAME`` as ``bench_run`` describes i
 
 from __future__ import annotations
 
+import argparse
 import importlib
 import json
 from pathlib import Path
@@ -83,7 +84,7 @@ def add_arguments(parser, in_blender: bool) -> None:
     bake.add_settings(parser)
     parser.add_argument("--quiet", action="store_true", help="no progress; warnings stay")
     parser.add_argument("--verbose", action="store_true", help="show what Blender itself prints")
-    parser.add_argument("--measure", help="for the processes that this command starts: what to measure, as JSON")
+    parser.add_argument("--measure", help=argparse.SUPPRESS)  # for the processes that this starts: a request as JSON
     parser.set_defaults(in_blender=in_blender)
 
 
@@ -95,11 +96,11 @@ def check(args) -> None:
         ("--error-nodes", args.error_nodes, 1, 1000),
         ("--eevee-samples", args.eevee_samples, 1, 1 << 20),
         ("--error-spp", args.error_spp, 1, 1 << 20),
-        ("--limit", args.limit, 1, 1e6),
-        ("--budget", args.budget, 1, 1e6),
+        ("--limit", args.limit, 1, 1_000_000),
+        ("--budget", args.budget, 1, 1_000_000),
     ):
         if value is not None and not low <= value <= high:
-            raise InputError(f"{name} is {value}; it must lie between {low} and {high:g}")
+            raise InputError(f"{name} is {value}; it must lie between {low} and {high}")
     for name in args.scene or []:
         if name not in bench_run.SCENES and not Path(name).is_file():
             raise InputError(f"{name}: no such file; name one, or {' or '.join(bench_run.SCENES)}")

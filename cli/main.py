@@ -117,7 +117,8 @@ def _run(argv: list[str], in_blender: bool, child: bool, family: Family) -> int:
     if child:
         worker.accept_interrupts(stop.ask)
     elif not in_blender:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        for number in worker.INTERRUPTS:
+            signal.signal(number, signal.default_int_handler)
     reporter = Reporter(quiet=getattr(args, "quiet", False))
     try:
         summary, status = module.run(args, reporter, stop)

@@ -47,7 +47,6 @@ def run(args, reporter, should_stop):
     job = Job(Path(args.job).absolute())
     if args.scheduler is None:
         need_libraries(reporter)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     _silence_dask()
     pool = _LocalPool(args.workers or 1, reporter) if args.scheduler is None else _RemotePool(args.scheduler)
     try:
