@@ -180,9 +180,13 @@ class VolumeBake:
 
     def start_over(self) -> Steps[None]:
         """Back to where ``see`` begins, with the texel surfaces that are there."""
+        self._begin_result()
+        yield from self._go_home()
+
+    def _begin_result(self) -> None:
+        """A new ``result`` for the same scene on the GPU, seen the same way."""
         self.result = BakeResult(scene=self.backend.scene, capture=self.result.capture)
         self._stopwatch.seconds = self.result.seconds
-        yield from self._go_home()
 
     def _go_home(self) -> Steps[None]:
         """Forgets patches; probes that had been moved capture at home, where placement begins."""
@@ -197,8 +201,7 @@ class VolumeBake:
         """Lights what was baked once more with other ``settings`` of light, its seed among them, in steps: probes stay
         where they are and see what they saw. ``result`` is a new one."""
         self.settings = self.backend.settings = settings
-        self.result = BakeResult(scene=self.backend.scene, capture=self.result.capture)
-        self._stopwatch.seconds = self.result.seconds
+        self._begin_result()
         self._batches.unbind()
         self.backend.forget_patches()
         self.backend.forget_emission()

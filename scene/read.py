@@ -15,11 +15,11 @@ from .camera import read_camera
 from .evaluation import as_in_viewport, at_render_quality, rendered_objects
 from .geometry import MeshArrays, WorldTriangles, place, read_mesh
 from .images import ImageTable
+from .instance_facts import InstanceFacts, facts_of
 from .lights import INTENSITY_PROPERTY, LightTable
 from .materials import MaterialTable, apply_domain
 from .notices import Notices
 from .surface_parts import SurfaceParts
-from .surface_samples import InstanceFacts
 from .surface_values import ATLAS, Wants, wants
 from .volumes import find_volumes
 from .world import read_world
@@ -33,8 +33,6 @@ _WITHOUT_SURFACE = {
     "GPENCIL": "grease pencil",
 }
 
-
-_UINT_MAX = 0xFFFFFFFF
 _MOST_ALONE = 64  # instances of meshes whose materials tell them apart; the rest look like the last one
 
 
@@ -188,8 +186,7 @@ def _harvest(
     Args:
         rendered: ``session_uid`` of the objects that a render shows; a viewport depsgraph holds others too.
         rigid_bodies: a simulation moves objects. Its state stays with the user's scene when that is copied for reading,
-        so
-            their places are taken from there.
+            so their places are taken from there.
     """
     harvest = _Harvest()
     for instance in depsgraph.object_instances:  # each one dies with its step of the iterator
@@ -249,7 +246,7 @@ def _add_mesh(harvest: _Harvest, item, instance, matrix: np.ndarray, name: str, 
     group_key = (key, intensity, alone, *(material.as_pointer() if material else 0 for material in slots))
     group = harvest.groups.get(group_key)
     if group is None:
-        facts = _facts(item, instance, frozenset().union(*(one.properties for one in asked)))
+        facts = facts_of(item, instance, frozenset().union(*(one.properties for one in asked)))
         group = harvest.groups[group_key] = _Instances(harvest.meshes[key], slots, intensity, facts)
     group.matrices.append(matrix)
     group.names.append(name)
@@ -260,44 +257,6 @@ def _wants(harvest: _Harvest, material: bpy.types.Material | None) -> Wants:
     if key not in harvest.wants:
         harvest.wants[key] = wants(material)
     return harvest.wants[key]
-
-
-def _facts(item: bpy.types.Object, instance, properties: frozenset[str]) -> InstanceFacts:
-    found = {}
-    for name in properties:
-        value = item.get(name, item.data.get(name))
-        try:
-            found[name] = tuple(float(one) for one in np.atleast_1d(value)) if value is not None else (0.0,)
-        except (TypeError, ValueError):  # text, or a datablock
-            found[name] = (0.0,)
-    return InstanceFacts(
-        location=tuple(instance.matrix_world.translation),
-        color=tuple(item.color),
-        index=float(item.pass_index),
-        random=((instance.random_id & _UINT_MAX) or _random_of_name(item.name)) / _UINT_MAX,
-        properties=found,
-    )
-
-
-def _random_of_name(name: str) -> int:
-    """The random number that Cycles gives an object that is no instance: Jenkins' hash (lookup3) of its name's hash."""
-    key = 0
-    for byte in name.encode():
-        key = (key * 37 + byte) & _UINT_MAX
-    a = b = c = (0xDEADBEEF + 8 + 13) & _UINT_MAX
-    a = (a + key) & _UINT_MAX
-    for which, turn in enumerate((14, 11, 25, 16, 4, 14, 24)):
-        if which % 3 == 0:
-            c = ((c ^ b) - _rotated(b, turn)) & _UINT_MAX
-        elif which % 3 == 1:
-            a = ((a ^ c) - _rotated(c, turn)) & _UINT_MAX
-        else:
-            b = ((b ^ a) - _rotated(a, turn)) & _UINT_MAX
-    return c
-
-
-def _rotated(value: int, bits: int) -> int:
-    return ((value << bits) | (value >> (32 - bits))) & _UINT_MAX
 
 
 def _slot_materials(item: bpy.types.Object, mesh: bpy.types.Mesh) -> list[bpy.types.Material | None]:

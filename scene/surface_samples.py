@@ -4,24 +4,14 @@ what the object is."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from .geometry import MeshArrays, place
+from .instance_facts import InstanceFacts
 from .node_links import Unsupported
 from .surface_atlas import Atlas, lay_out
-
-
-@dataclass
-class InstanceFacts:
-    """What the Object Info and Attribute nodes tell of an object."""
-
-    location: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
-    index: float = 0.0
-    random: float = 0.0
-    properties: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
 
 @dataclass
