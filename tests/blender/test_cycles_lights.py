@@ -179,12 +179,14 @@ def test_light_on_a_wall(gpu_context, name):
     check(scene)
 
 
+@pytest.mark.any_version
 def test_light_on_a_wall_two_kilometres_wide(gpu_context):
     scene = wall_and_screen("Huge", half_edge=1000.0)
     scenes.add_light(scene, "POINT", BEHIND, energy=50, shadow_soft_size=0.3)
     check(scene)
 
 
+@pytest.mark.any_version
 def test_light_scales_with_negative_power(gpu_context):
     """A lamp with negative power takes exactly the light away that it would give."""
     fields = []

@@ -243,6 +243,7 @@ def on_an_edge(reference, probe, texel, triangle):
     return bool((edges @ direction).max() > np.cos(2e-3))
 
 
+@pytest.mark.any_version
 @pytest.mark.parametrize("name", SCENES)
 def test_captures_give_the_same_light(name):
     build, low, high = SCENES[name]

@@ -187,6 +187,7 @@ def corridor_with_lamp(position):
     return snapshot, Grid.from_bounds([0.2, 0.2, 0.2], [2.4, 0.8, 0.8], (4, 2, 2))
 
 
+@pytest.mark.any_version
 def test_a_lamp_round_the_corner():
     """Most of the light comes by walls of the next arm that no probe sees. Against paths of two segments, which meet
     the lamp's light there themselves; patches stand for the mean of their light."""
@@ -224,6 +225,7 @@ def room_with_a_thick_wall():
     return snapshot, Grid.from_bounds([-1.6, -1.1, -0.8], [1.6, 1.1, 0.8], (3, 3, 2))
 
 
+@pytest.mark.any_version
 def test_a_moved_probe_is_a_probe_of_its_new_place():
     snapshot, grid = room_with_a_thick_wall()
     field = bake(snapshot, grid, BakeSettings(keep_all=True)).field
@@ -238,6 +240,7 @@ def test_a_moved_probe_is_a_probe_of_its_new_place():
         )
 
 
+@pytest.mark.any_version
 @pytest.mark.parametrize("capture", ["trace", "raster"])
 def test_a_small_memory_budget(capture):
     """Texel surfaces that do not fit are captured again whenever they are needed, and give the same bytes."""

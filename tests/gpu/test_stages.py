@@ -301,7 +301,9 @@ def compare_bakes(snapshot, settings):
 WHOLE = {name: all_lights()[name] for name in ("point soft", "sun", "ellipse")}
 
 
-@pytest.mark.parametrize("method,keep_all", [("trace", True), ("raster", False)])
+@pytest.mark.parametrize(
+    "method,keep_all", [("trace", True), pytest.param("raster", False, marks=pytest.mark.any_version)]
+)
 def test_the_whole_bake(method, keep_all):
     """End to end, nothing handed over: culling, votes, statistics, patches, light, fill. Grazing rays now count, so
     0.5 %."""
