@@ -41,6 +41,11 @@ def program(name: str, **defines) -> gpu.types.GPUShader:
     return _programs[key] if observer is None else observer(name, _programs[key])
 
 
+def compiled() -> int:
+    """Programs compiled so far."""
+    return len(_programs)
+
+
 def _compile(name: str, defines: dict) -> gpu.types.GPUShader:
     info = gpu.types.GPUShaderCreateInfo()
     info.define("EXACT", "" if gpu.platform.backend_type_get() == "METAL" else "precise")
