@@ -88,7 +88,7 @@ class BakeSession(VolumeBake):
         emitters = changes.emission and (had_emitters or self.backend.scene.emitter_count > 0)
         lamps = self._changed_lamps(changes)
         if lamps.any() or changes.lights_removed or changes.world or emitters:
-            relit.lights_direct = yield from self._stopwatch.steps("light", light.light_again(lamps, emitters, live))
+            relit.lights_direct = yield from self._stopwatch.steps("light", light.light_again(lamps, emitters))
             relit.patches_lit = light.count if relit.lights_direct or emitters else 0
             yield
         if changes.world or changes.emission or changes.reflectance:

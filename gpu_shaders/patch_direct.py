@@ -70,30 +70,26 @@ class PatchDirect:
             light.grow(*fresh)
             self.find_spread(part, points, *fresh, light.spread.texture)
             yield
-        yield from self._light_what_is_due(points, list(self._parts))
+        yield from self._light_what_is_due(points)
 
-    def again(
-        self, points: gpu.types.GPUTexture, changed: np.ndarray, emitters: bool, live: bool = False
-    ) -> Steps[int]:
+    def again(self, points: gpu.types.GPUTexture, changed: np.ndarray, emitters: bool) -> Steps[int]:
         """Direct light where lamps ``changed`` (lamp_count,) bool, or all sampled ``emitters``, or came or left, in
-        steps. ``live``: the number of samples of what did not change stays as it is.
+        steps.
 
         Returns the number of lamps that were lit from nothing.
         """
         before, self._parts, lamps = self._parts, {}, 0
-        fresh: list[Part] = []
         for part in self._wanted_parts():
             differs = emitters if part == EMITTERS else changed[slice(*part)].any()
             if part in before and not differs:
                 self._parts[part] = before[part]
                 continue
             light = self._parts[part] = _PartLight()
-            fresh.append(part)
             light.grow(0, self.count)
             self.find_spread(part, points, 0, self.count, light.spread.texture)
             lamps += part[1] - part[0] if isinstance(part, tuple) else 0
             yield
-        yield from self._light_what_is_due(points, fresh if live else list(self._parts))
+        yield from self._light_what_is_due(points)
         return lamps
 
     def _wanted_parts(self) -> list[Part]:
@@ -102,18 +98,18 @@ class PatchDirect:
     # How many samples
     # ------------------------------------------------------------------------------------------------------------------
 
-    def _light_what_is_due(self, points: gpu.types.GPUTexture, parts: list[Part]) -> Steps[None]:
-        """Patches that ``parts`` did not light, or with another number of samples than they should."""
+    def _light_what_is_due(self, points: gpu.types.GPUTexture) -> Steps[None]:
+        """Patches that were not lit, or with another number of samples than they should have."""
         lights = self._lights_together()
-        classes = len(SAMPLES)
+        classes, parts = len(SAMPLES), list(self._parts.items())
         counts = scratch(max(len(parts) * classes, 1), "patches", "R32F")
-        lists = [self._list_due(self._parts[part], lights, counts, row * classes) for row, part in enumerate(parts)]
+        lists = [self._list_due(light, lights, counts, row * classes) for row, (_part, light) in enumerate(parts)]
         lengths = read(counts, len(parts) * classes, channels=1).reshape(-1, classes).astype(int)
-        for part, due, numbers in zip(parts, lists, lengths):
+        for (part, light), due, numbers in zip(parts, lists, lengths):
             for index, number in enumerate(numbers):
                 if number:
                     samples, first = SAMPLES[index] * self.effort, index * self.count
-                    target = self._parts[part].values.texture
+                    target = light.values.texture
                     yield from self.light(
                         points, POINTS, due, int(number), samples, target, part=part, first_entry=first
                     )

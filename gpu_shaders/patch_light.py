@@ -66,10 +66,10 @@ class PatchLight:
         yield from self._direct.add(self.patches.points, self.count)
         self._brightest = None
 
-    def light_again(self, changed: np.ndarray, emitters: bool, live: bool) -> Steps[int]:
+    def light_again(self, changed: np.ndarray, emitters: bool) -> Steps[int]:
         """Direct light of all patches where lamps ``changed`` (lamp_count,) bool, or sampled ``emitters`` did, in
-        steps; ``live`` as in PatchDirect.again. Returns the number of lamps that were computed."""
-        lamps = yield from self._direct.again(self.patches.points, changed, emitters, live)
+        steps. Returns the number of lamps that were computed."""
+        lamps = yield from self._direct.again(self.patches.points, changed, emitters)
         self._brightest = None
         return lamps
 
