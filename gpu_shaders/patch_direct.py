@@ -100,9 +100,11 @@ class PatchDirect:
 
     def _light_what_is_due(self, points: gpu.types.GPUTexture) -> Steps[None]:
         """Patches that were not lit, or with another number of samples than they should have."""
-        lights = self._lights_together()
-        classes, parts = len(SAMPLES), list(self._parts.items())
-        counts = scratch(max(len(parts) * classes, 1), "patches", "R32F")
+        if not self._parts:
+            self._add_up()
+            return
+        lights, classes, parts = self._lights_together(), len(SAMPLES), list(self._parts.items())
+        counts = scratch(len(parts) * classes, "patches", "R32F")
         lists = [self._list_due(light, lights, counts, row * classes) for row, (_part, light) in enumerate(parts)]
         lengths = read(counts, len(parts) * classes, channels=1).reshape(-1, classes).astype(int)
         for (part, light), due, numbers in zip(parts, lists, lengths):
@@ -118,17 +120,13 @@ class PatchDirect:
     def _lights_together(self) -> gpu.types.GPUTexture:
         """What errors are held against: the mean that all parts send to each patch, and in ``_mean_lights`` the mean of
         that by range of patches."""
-        parts, ranges = list(self._parts.values()), self._together
-        sums = scratch(max(len(parts) * len(ranges), 1), "patches", "R32F")
-        for row, (first, stop) in enumerate(ranges):
-            for column, light in enumerate(parts):
-                reduce_patches(light.spread.texture, first, stop, sums, row * len(parts) + column)
-        table = read(sums, len(parts) * len(ranges), channels=1).reshape(len(ranges), len(parts)).astype(float)
+        lights, sums = scratch(self.count, "patches"), scratch(len(self._together), "patches", "R32F")
+        add_patches(lights, self.count, [light.spread.texture for light in self._parts.values()])
+        for row, (first, stop) in enumerate(self._together):
+            reduce_patches(lights, first, stop, sums, row)
         target = self._mean_lights.reserve(self.count)
-        for (first, stop), means in zip(ranges, table):
-            fill_elements(target, first, stop - first, float(means.sum()) / max(stop - first, 1))
-        lights = scratch(self.count, "patches")
-        add_patches(lights, self.count, [light.spread.texture for light in parts])
+        for (first, stop), total in zip(self._together, read(sums, len(self._together), channels=1)[:, 0].tolist()):
+            fill_elements(target, first, stop - first, total / max(stop - first, 1))
         return lights
 
     def _list_due(self, light: _PartLight, lights, counts, first: int) -> gpu.types.GPUTexture:
