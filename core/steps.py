@@ -28,6 +28,22 @@ def run(steps: Steps[Result]) -> Result:
             return end.value
 
 
+def together(*several: Steps[Any]) -> Steps[list[Any]]:
+    """Follows ``several`` in lockstep, so that in each step all of them see the world in one state; their results."""
+    results: list[Any] = [None] * len(several)
+    running = dict(enumerate(several))
+    while running:
+        for index, steps in list(running.items()):
+            try:
+                next(steps)
+            except StopIteration as end:
+                results[index] = end.value
+                del running[index]
+        if running:
+            yield
+    return results
+
+
 class Pace:
     """How much work goes into a step. ``Pace(None)`` does everything at once: for runs that nobody watches."""
 

@@ -19,7 +19,7 @@ from ..core.grid import Grid
 from ..core.probe_edits import ProbeEdits
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
-from ..core.steps import STEP_SECONDS, Pace
+from ..core.steps import STEP_SECONDS, Pace, together
 from ..formats import probe_file
 from ..formats.probe_metadata import part_hashes, provenance
 from ..gpu_shaders.context import device_description, ensure_context
@@ -106,13 +106,15 @@ class BakeTask:
         for grid in grids:
             probe_file.check_size(grid, self.settings.bands)
         put_by_hand = animated_states(scene)
+        view_layer: bpy.types.ViewLayer = scene.view_layers.get(self._view_layer)
         try:
-            snapshot = yield from read_in_steps(scene, scene.view_layers.get(self._view_layer))
+            # Together, because what is shown now says later whether the scene is still the one that was baked.
+            snapshot, shown_now = yield from together(
+                read_in_steps(scene, view_layer), read_in_steps(scene, view_layer, live=True)
+            )
         except RuntimeError as error:  # Blender could not evaluate the scene at render quality now
             raise InputError(f"the scene cannot be read: {error}") from error
-        scene = self._find_scene()
-        noticed = [*snapshot.warnings, *taken_back(scene, put_by_hand)]
-        shown_now = yield from read_in_steps(scene, scene.view_layers.get(self._view_layer), live=True)
+        noticed = [*snapshot.warnings, *taken_back(self._find_scene(), put_by_hand)]
         shown = yield from self._pace.in_background(part_hashes, shown_now)
         for warning in noticed:
             self.progress.warn(warning)

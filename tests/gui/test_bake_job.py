@@ -97,6 +97,8 @@ def test_deleting_the_volume_in_the_middle(person):
 def test_deleting_something_else_goes_on_and_is_stale(person):
     volume = room(person)
     yield from start(person)
+    task = person.module("operators.bake").running_task()
+    yield from person.wait_until(lambda: task.progress.phase_name != "read", "the scene to be read", step=0.01)
     bpy.data.objects.remove(bpy.data.objects["Light"])
     yield from person.wait_until(lambda: person.module("operators.bake").running_task() is None, "the bake", 60)
     stale = person.module("operators.stale")

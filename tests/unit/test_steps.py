@@ -5,7 +5,7 @@ import threading
 import time
 
 import pytest
-from gridlight.core.steps import Pace, run
+from gridlight.core.steps import Pace, run, together
 
 
 def counted(pace, count, seconds_each=0.0, **options):
@@ -55,3 +55,25 @@ def test_background_work_returns_and_raises():
     with pytest.raises(ZeroDivisionError):
         run(pace.in_background(lambda: 1 / 0))
     assert run(Pace(None).in_background(threading.current_thread)) is threading.current_thread()
+
+
+def test_together_goes_in_lockstep_and_gives_all_results():
+    seen = []
+
+    def steps(name, count):
+        for index in range(count):
+            seen.append(f"{name}{index}")
+            yield
+        return name
+
+    ticks = 0
+    both = together(steps("a", 1), steps("b", 3))
+    while True:
+        try:
+            next(both)
+        except StopIteration as end:
+            assert end.value == ["a", "b"]
+            break
+        ticks += 1
+    assert seen == ["a0", "b0", "b1", "b2"] and ticks == 3
+    assert run(together()) == []
