@@ -29,6 +29,7 @@ _CLIP_NEAR_M, _CLIP_FAR_M = 1e-6, 1e7
 # How finely suns of the world are rendered: pixels across one, and samples of each. A pixel of a few degrees, with
 # samples all over it, hardly meets a disc.
 _ACROSS_SUN, _SUN_SAMPLES, _MOST_WIDTH = 6, 256, 32768
+_INSIDE = 0.01  # of a pixel
 
 _FAR_M = 1000.0  # from the origin: single precision has 0.06 mm there
 
@@ -111,9 +112,10 @@ def _close_up(copy: bpy.types.Scene, layer: str, sun: Light, width: int, height:
     render.resolution_x, render.resolution_y, cycles.samples = width, height, _SUN_SAMPLES
     render.use_border = render.use_crop_to_border = True
     rows, columns = _covered(sun, width, height)
-    render.border_min_y, render.border_max_y = rows[0] / height, (rows[-1] + 1) / height
+    # Blender cuts borders down to whole pixels, after rounding them to single precision.
+    render.border_min_y, render.border_max_y = (rows[0] + _INSIDE) / height, (rows[-1] + 1 + _INSIDE) / height
     for part in np.split(columns, np.flatnonzero(np.diff(columns) != 1) + 1):
-        render.border_min_x, render.border_max_x = part[0] / width, (part[-1] + 1) / width
+        render.border_min_x, render.border_max_x = (part[0] + _INSIDE) / width, (part[-1] + 1 + _INSIDE) / width
         radiance = render_pixels(copy, layer)
         yield radiance, panorama_solid_angles(width, height, rows, part), panorama_directions(width, height, rows, part)
     render.use_border = render.use_crop_to_border = False
