@@ -25,6 +25,7 @@ from .cubemap import (
     texel_directions,
     texel_solid_angles,
 )
+from .direct_light import sample_light
 from .field import Field
 from .grid import Grid
 from .orientation import ShellVote, inside_solid
@@ -32,9 +33,13 @@ from .patches import gather_rays
 from .rays import pull_back
 from .reference_light import ReferenceLight
 from .reference_scene import ReferenceScene, Surfaces
+from .sampling import keys_of, sample_r2
 from .settings import BakeSettings
 from .snapshot import SceneSnapshot
 from .world_map import world_texels
+from .world_suns import PROBE_RAYS, extract_suns
+
+_SUN_STREAM = 0x7F4A7C15
 
 
 class ReferenceBake:
@@ -67,7 +72,7 @@ class ReferenceBake:
         hits = self.scene.closest(origins, directions)
         flat = self.scene.resolve(hits, directions, 2.0 / self.settings.face)
         missed = hits.triangle < 0
-        background = world_texels(self.snapshot.world, self.settings.face).reshape(-1, 3)
+        background = world_texels(extract_suns(self.snapshot.world)[0], self.settings.face).reshape(-1, 3)
         flat.emission[missed] = np.tile(background, (shape[0], 1))[missed]
         return Surfaces(*(value.reshape(*shape, *value.shape[1:]) for value in vars(flat).values()))
 
@@ -171,6 +176,20 @@ class ReferenceBake:
             coefficients += sh.project(seen.flux, seen.direction, np.ones(len(seen.flux)), self.settings.bands)
         return by_texels
 
+    def project_suns(self) -> np.ndarray:
+        """(P, K, 3) coefficients of what probes see of the suns of the world: rays to their discs."""
+        result = np.zeros((len(self.nodes), self.settings.bands**2, 3))
+        count, index = len(self.nodes), np.arange(PROBE_RAYS)
+        origins = np.repeat(self.positions, PROBE_RAYS, axis=0)
+        for number, sun in enumerate(extract_suns(self.snapshot.world)[1]):
+            keys = np.repeat(keys_of(self.nodes, _SUN_STREAM + number, self.settings.seed), PROBE_RAYS, axis=0)
+            sample = sample_light(sun, origins, sample_r2(keys, np.tile(index, count)).astype(float))
+            seen = self.scene.visible(origins, sample.directions, sample.distances)
+            flux = (sample.irradiance * seen[:, None] / PROBE_RAYS).reshape(count, PROBE_RAYS, 3)
+            basis = sh.basis(sample.directions, self.settings.bands).reshape(count, PROBE_RAYS, -1)
+            result += np.einsum("prk,prc->pkc", basis, flux)
+        return result
+
     def gradient(self, surfaces: Surfaces, reflected: np.ndarray) -> np.ndarray:
         """(P, 3, K, 3) change of all coefficients per metre, not limited."""
         sampled = (surfaces.triangle >= 0) & (self.light.emitters.density[surfaces.triangle] > 0)
@@ -214,7 +233,7 @@ def bake(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, offset: np
         irradiance = job.light.gather(hits, gather_rays(settings.samples), irradiance, 0)
         patch = np.where(patch >= 0, np.arange(patch.size).reshape(patch.shape), patch)
     reflected = job.reflected(surfaces, patch, irradiance)
-    coefficients = job.project(surfaces, reflected) + job.project_emitters(surfaces)
+    coefficients = job.project(surfaces, reflected) + job.project_emitters(surfaces) + job.project_suns()
     field.coefficients = np.zeros((grid.count, settings.bands**2, 3))
     field.coefficients[job.nodes] = coefficients
     field.coefficients = dilation.fill(grid, field.coefficients, field.state == ACTIVE)

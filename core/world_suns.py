@@ -3,7 +3,7 @@
 
 A sun of a few pixels holds most of a sky's light, and rays that leave a surface at random would find it once in ten
 thousand. What stands far out of the map is therefore sampled like a sun lamp of the same direction, size and
-irradiance; rays see the rest. Probes see the whole map: there a texel holds its mean (core/world_map.py).
+irradiance, by patches and by probes; rays and texels see the rest.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ _REACH = np.cos(np.radians(4.0))  # from its brightest pixel, what belongs to a 
 _AROUND = np.cos(np.radians(8.0))  # what is bright beyond, too, is a bright part of the sky, which rays find
 _MOST_AROUND = 0.2
 _MOST_SUNS = 8
+PROBE_RAYS = 64  # that a probe sends to each sun
 
 
 def extract_suns(world: World) -> tuple[World, list[Light]]:

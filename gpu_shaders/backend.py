@@ -28,6 +28,7 @@ from .patch_light import PatchLight
 from .programs import program
 from .raster_capture import RasterCapture
 from .scene_textures import SceneTextures
+from .sun_pass import add_suns
 from .textures import allocate, layers, numbers, read, scratch, upload
 from .world_light import send_world
 
@@ -95,7 +96,7 @@ class GpuBackend:
         weights[:, 0] = texel_solid_angles(self.face).ravel()
         self._texel_weights = upload(weights, "texels")
         self._gradient = GradientPass(settings.face, settings.bands, grid)
-        self.world_texels, self.world_rest = send_world(self.scene, snapshot.world, self.face)
+        self.world_texels = send_world(self.scene, snapshot.world, self.face)
         self.forget_patches()
         layer_limit = gpu.capabilities.max_texture_layers_get()
         texels = 6 * self.face**2
@@ -136,8 +137,7 @@ class GpuBackend:
             self._raster = None  # it knows where triangles lie
             self.object_count = max(len(snapshot.object_names), 1)
         if changes.world:
-            self.world_texels, self.world_rest = send_world(self.scene, snapshot.world, self.face)
-            self.light.world_texels = self.world_rest
+            self.world_texels = self.light.world_texels = send_world(self.scene, snapshot.world, self.face)
         return hierarchy
 
     # Probes
@@ -254,7 +254,7 @@ class GpuBackend:
         grid, settings = self.grid, self.settings
         if self._block is not None:
             grid, settings = self._block.grid(grid), replace(settings, seed=self._block.seed(settings.seed))
-        self.light = PatchLight(self.scene, grid, settings, self.world_rest, self._pace)
+        self.light = PatchLight(self.scene, grid, settings, self.world_texels, self._pace)
 
     def release_scratch(self) -> None:
         """Lets go of what only a capture needs."""
@@ -331,6 +331,7 @@ class GpuBackend:
         shader.uniform_int("own_texels", (int(own_texels),))
         gpu.compute.dispatch(shader, len(layers_), 1, 1)
         layers_and_count = (listed, len(layers_))
+        add_suns(self.scene, self.settings, self.probe_slots, surfaces.first, layers_and_count, self._field)
         self._gradient.project(
             surfaces.textures,
             surfaces.first,

@@ -201,6 +201,16 @@ def field_gradient_comp(info, defines):
     return {"compute": [*_PROBE_FILES, "texel_light_lib", "probe_emitter_lib", "field_gradient_comp"]}
 
 
+def sun_project_comp(info, defines):
+    slot = _scene(info, defines, attributes=False)
+    _samplers(info, "lights", "probe_slots", "probe_layers", first=slot)
+    _image(info, 0, "field", access="READ+WRITE")
+    _ints(info, "first_slot", "first_sun", "light_count", "seed")
+    _group_sums(info, defines)
+    files = ["data_lib", "spherical_harmonics_lib", "group_sum_lib", *_light_files(defines), "sun_project_comp"]
+    return {"compute": files}
+
+
 def texel_hits_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
     slot = _samplers(info, "probe_slots", "triangle_corners")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The world as shaders read it, texels of a cube's faces: for bakes whole to probes and without its suns to patches."""
+"""The world as shaders read it, texels of a cube's faces: without its suns, which are lamps to bakes."""
 
 from __future__ import annotations
 
@@ -14,20 +14,18 @@ from ..core.world_suns import extract_suns
 from .scene_textures import SceneTextures
 from .textures import upload
 
-# World, face size and texels, by scene: blocks of a bake share both.
+# World, face size and texels, by scene: blocks of a bake share them.
 _known: WeakKeyDictionary[SceneTextures, tuple] = WeakKeyDictionary()
 
 
-def send_world(scene: SceneTextures, world: World, face: int) -> tuple[gpu.types.GPUTexture, gpu.types.GPUTexture]:
-    """(whole, rest), faces of ``face``² texels one after the other. Probes see the world whole; to patches its suns are
-    lamps, which ``scene`` gets, and rays see the rest."""
+def send_world(scene: SceneTextures, world: World, face: int) -> gpu.types.GPUTexture:
+    """Faces of ``face``² texels one after the other, without the suns of ``world``, which ``scene`` gets as lamps."""
     known = _known.get(scene)
     if known is None or known[0] is not world or known[1] != face:
         rest, suns = extract_suns(world)
         scene.set_suns(suns)
-        whole = world_texture(world, face)
-        known = _known[scene] = world, face, whole, world_texture(rest, face) if suns else whole
-    return known[2], known[3]
+        known = _known[scene] = world, face, world_texture(rest, face)
+    return known[2]
 
 
 def world_texture(world: World, face: int) -> gpu.types.GPUTexture:

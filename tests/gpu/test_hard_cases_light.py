@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gridlight.core.errors import InputError
 from gridlight.core.grid import Grid
-from gridlight.core.panorama import project_panorama
+from gridlight.core.panorama import panorama_directions, panorama_solid_angles, project_panorama
 from gridlight.core.settings import BakeSettings
 from gridlight.core.snapshot import Light, Material, World
 from hard_rooms import GREY, HALF, LAMP, SMALL, bake_room, check_whole, difference, grid, light_at, points, room
@@ -166,6 +166,34 @@ def odd_lights():
         "lamp of a millionth": Light("l", "POINT", color, at, radius=1e-7),
         "without colour": Light("l", "POINT", (0.0, 0.0, 0.0), at),
     }
+
+
+@pytest.mark.parametrize("covered", [0.0, 0.5, 1.0])
+def test_a_sun_of_the_sky_behind_an_edge(covered):
+    """Texels of 8² faces are eleven degrees wide, the sun is one: probes must see the part of it that a black wall
+    leaves, from where it stands, whatever texel it falls into."""
+    height = 256
+    sky = np.zeros((height, 2 * height, 3), np.float32)
+    row, columns = 160, (300, 301)
+    sky[row, columns] = 1e4
+    direction = panorama_directions(2 * height, height)[row, columns].mean(axis=0)
+    direction /= np.linalg.norm(direction)
+    flux = 1e4 * panorama_solid_angles(2 * height, height)[row, columns].sum()
+    level = np.cross([0, 0, 1], direction)
+    level /= np.linalg.norm(level)
+    up = np.cross(direction, level)
+    # a wall whose upper edge is seen at the sun's middle, or above or below it
+    edge = (covered - 0.5) * 0.2 * up + direction
+    wall = 10 * np.array([edge - level, edge + level, edge + level - up, edge - level - up])
+    probes = Grid.from_bounds((-1e-3,) * 3, (1e-3,) * 3, (2, 2, 2))
+    snapshot = snapshot_of(wall[[[0, 1, 2], [0, 2, 3]]], materials=[Material("black", (0,) * 3)], world=World(map=sky))
+    result = bake(snapshot, probes, BakeSettings(face=8, keep_all=True))
+    check_whole(result)
+    coefficients = result.field.coefficients[:, :, 0].astype(float)
+    seen = 1 - covered
+    np.testing.assert_allclose(coefficients[:, 0] / 0.28209479177387814, flux * seen, rtol=0.1, atol=1e-3 * flux)
+    towards = coefficients[:, [3, 1, 2]].mean(axis=0) / 0.4886025119029199
+    np.testing.assert_allclose(towards, flux * seen * direction, atol=0.02 * flux)
 
 
 @pytest.mark.parametrize("name", odd_lights())
