@@ -3,7 +3,7 @@
  * Rays are cosine-weighted, so π·mean(radiance) is the irradiance and π cancels against albedo/π. Ends that lie on no patch are left
  * out of the mean: the row sums of the transport stay right, a furnace stays a furnace.
  * Dispatch: one thread a patch; groups of 64. ray_ends: −1 no patch, −2 nothing comes back.
- * Reference: core/reference_bake.py.
+ * Reference: core/reference_light.py, bounce.
  */
 
 void main()
