@@ -33,13 +33,8 @@ from .textures import allocate, layers, numbers, read, scratch, upload
 from .world_light import send_world
 
 _GROUP = 64  # threads that share a probe where its texels are summed
-# Kept images of texel surfaces. Albedo is 32 bit: in a bright room an error of 1e-4 in 0.99 is one of 1e-2 in the
-# light.
-_SURFACE_FORMATS = {
-    "geometry": "RGBA32F",
-    "albedo": "RGBA32F",
-    "emission": "RGBA32F",
-}
+# Kept images of texel surfaces. Albedo is 32 bit: in a bright room an error of 1e-4 in 0.99 is one of 1e-2 in light.
+_SURFACE_FORMATS = {"geometry": "RGBA32F", "albedo": "RGBA32F", "emission": "RGBA32F"}
 BYTES_PER_TEXEL = 16 * len(_SURFACE_FORMATS)
 _GATHER_RAYS = 1 << 20  # at once
 _TEXELS_AT_ONCE = 1 << 19  # that are bound to patches; their surfaces take 24 MiB
