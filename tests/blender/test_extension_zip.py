@@ -84,6 +84,13 @@ def test_wheels_are_the_pinned_ones(zips, manifest):
     assert held == set(pinned) and len(pinned) == len(manifest["wheels"])
 
 
+def test_what_is_tested_is_what_is_shipped(manifest):
+    """Tests and launcher used OpenEXR 3.4 once while the zip carried 3.5."""
+    shipped = {name.split("-")[1] for name in manifest["wheels"]}
+    pins = [(ROOT / "requirements" / name).read_text() for name in ("bpy45.txt", "bpy52.txt", "wheels.txt")]
+    assert {re.search(r"^OpenEXR==(\S+)", pin, re.MULTILINE)[1] for pin in pins} == shipped and len(shipped) == 1
+
+
 def test_rules_of_the_extensions_platform(zips, manifest):
     assert manifest["license"] == ["SPDX:GPL-3.0-or-later"] and set(manifest["permissions"]) == {"files"}
     assert "blender" not in manifest["name"].lower() and manifest["tagline"][-1].isalnum()
