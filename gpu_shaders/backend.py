@@ -327,15 +327,8 @@ class GpuBackend:
         gpu.compute.dispatch(shader, len(layers_), 1, 1)
         layers_and_count = (listed, len(layers_))
         add_suns(self.scene, self.settings, self.probe_slots, surfaces.first, layers_and_count, self._field)
-        self._gradient.project(
-            surfaces.textures,
-            surfaces.first,
-            layers_and_count,
-            self._texel_weights,
-            irradiance,
-            own_texels,
-            _GROUP,
-        )
+        where = surfaces.textures, surfaces.first, layers_and_count
+        self._gradient.project(*where, self._texel_weights, irradiance, own_texels, _GROUP)
 
     def forget_emission(self) -> None:
         """No probe sees a sampled emitter."""
