@@ -290,6 +290,9 @@ def is_users(item):
 
 def user_data():
     """What belongs to the user, in a form that can be compared."""
+    for item in bpy.data.objects:
+        if item.mode == "EDIT":
+            item.update_from_editmode()  # else a mesh is as old as the last one who wanted to read it
     data = {}
     for item in bpy.data.objects:
         if is_users(item):
@@ -315,6 +318,8 @@ def user_data():
             scene.view_settings.view_transform,
         )
     for kind in ("materials", "worlds", "images", "cameras", "actions", "collections", "texts"):
-        mine = [block.name for block in getattr(bpy.data, kind) if not block.name.startswith("Gridlight")]
+        # Probes lie in a collection that is called like their volume, and marked.
+        blocks = [block for block in getattr(bpy.data, kind) if "gridlight_probes" not in block]
+        mine = [block.name for block in blocks if not block.name.startswith("Gridlight")]
         data[kind] = sorted(name for name in mine if "Render Result" not in name and "Viewer Node" not in name)
     return data

@@ -59,8 +59,10 @@ class BusyUser(User):
         scene = bpy.context.scene
         for quality in ("DRAFT", "GOOD", "FINAL"):
             scene.gridlight.quality = quality
-            yield from self.start_bake()
-            yield from self.wait_for_bake()
+            for lamps in (0, 3, 1):
+                yield from self.have_lamps(lamps)
+                yield from self.start_bake()
+                yield from self.wait_for_bake()
             yield from self.live()
             yield from self.add_light()
             yield from self.move_lights()
@@ -71,6 +73,13 @@ class BusyUser(User):
             self.said.append(act.__name__)
             yield from act()
             yield 0.05
+
+    def have_lamps(self, count):
+        for item in [item for item in bpy.context.scene.objects if item.type == "LIGHT"]:
+            bpy.data.objects.remove(item)
+        for _ in range(count):
+            yield from self.add_light()
+        yield 0.05
 
     def place(self):
         if self.volumes():  # they may have been deleted, and placing says so
