@@ -113,11 +113,11 @@ def _state(layout, context) -> None:
         paragraph(row, context, f"{_what_changed(context.scene, volume)} since the bake. {remedy}", "ERROR", buttons=1)
     elif state == EDITED:
         row.label(text="Edited since the bake", icon="QUESTION")
+        # In the same row: this state passes by itself, and nothing below must move under a click.
+        row.operator(names.CHECK_BAKE, text="", icon="FILE_REFRESH")
     else:
         row.label(text="The light is up to date", icon="CHECKMARK")
     row.operator(names.CLEAR_BAKE, text="", icon="TRASH")
-    if state == EDITED:
-        layout.operator(names.CHECK_BAKE, icon="FILE_REFRESH")
     paragraph(layout, context, last_failure() or stored_details(volume).get("outcome", ""), "BLANK1")
     warnings = len(metadata.get("warnings", []))
     if warnings:
