@@ -307,7 +307,7 @@ WHOLE = {name: all_lights()[name] for name in ("point soft", "sun", "ellipse")}
 def test_the_whole_bake(method, keep_all):
     """End to end, nothing handed over: culling, votes, statistics, patches, light, fill. Grazing rays now count, so
     0.5 %."""
-    compare_bakes(cluttered_room(WHOLE, clutter=6), BakeSettings(face=5, bounces=3, keep_all=keep_all, capture=method))
+    compare_bakes(cluttered_room(WHOLE, clutter=10), BakeSettings(face=6, bounces=3, keep_all=keep_all, capture=method))
 
 
 def test_the_twin_is_not_the_shader(stages):
