@@ -270,7 +270,7 @@ def patch_rays_comp(info, defines):
     _image(info, 0, "hits")
     _image(info, 1, "carried")
     _image(info, 2, "reflected")
-    _ints(info, "first_ray", "ray_count", "first_key", "seed")
+    _ints(info, "first_ray", "ray_count", "rays_each", "first_key", "seed")
     info.local_group_size(64, 1, 1)
     return {
         "compute": [
@@ -290,7 +290,7 @@ def patch_rays_comp(info, defines):
 def patch_carried_comp(info, defines):
     _samplers(info, "carried")
     _image(info, 0, "brought")
-    _ints(info, "first_patch", "patch_count")
+    _ints(info, "first_patch", "patch_count", "rays_each")
     info.local_group_size(64, 1, 1)
     return {"compute": ["data_lib", "patch_carried_comp"]}
 
@@ -298,7 +298,7 @@ def patch_carried_comp(info, defines):
 def patch_iterate_comp(info, defines):
     _samplers(info, "direct", "brought", "reflected", "ray_ends", "irradiance_in")
     _image(info, 0, "irradiance_out")
-    _ints(info, "patch_count", "bounce")
+    _ints(info, "patch_count", "rays_each", "bounce")
     info.local_group_size(64, 1, 1)
     return {"compute": ["data_lib", "patch_iterate_comp"]}
 

@@ -161,7 +161,6 @@ class PatchLight:
             "patch_rays_comp",
             FACE=self._settings.face,
             POINTS=points_each,
-            RAYS=rays_each,
             SEGMENTS=segments,
             **(defines | {"HAS_IMAGES": self._scene.has_images}),
         )
@@ -175,16 +174,18 @@ class PatchLight:
         for name, value in (
             ("first_ray", first * rays_each),
             ("ray_count", rays),
+            ("rays_each", rays_each),
             ("first_key", first_key),
             ("seed", self._settings.seed),
         ):
             shader.uniform_int(name, (value,))
         dispatch_linear(shader, rays)
-        shader = program("patch_carried_comp", RAYS=rays_each)
+        shader = program("patch_carried_comp")
         shader.uniform_sampler("carried", carried)
         shader.image("brought", brought)
         shader.uniform_int("first_patch", (first,))
         shader.uniform_int("patch_count", (count,))
+        shader.uniform_int("rays_each", (rays_each,))
         dispatch_linear(shader, count)
         return _Rays(rays, hits)
 
@@ -243,7 +244,7 @@ class PatchLight:
         self, direct, brought, reflected, ends, rays_each: int, count: int, target, bounce: bool = True
     ) -> None:
         """Irradiance of ``count`` patches from the newest irradiance at the ends of their rays, into ``target``."""
-        shader = program("patch_iterate_comp", RAYS=rays_each)
+        shader = program("patch_iterate_comp")
         for name, texture in (
             ("direct", direct),
             ("brought", brought),
@@ -254,6 +255,7 @@ class PatchLight:
             shader.uniform_sampler(name, texture)
         shader.image("irradiance_out", target)
         shader.uniform_int("patch_count", (count,))
+        shader.uniform_int("rays_each", (rays_each,))
         shader.uniform_int("bounce", (int(bounce),))
         dispatch_linear(shader, count)
 

@@ -10,8 +10,8 @@ void main()
     return;
   }
   vec3 sum = vec3(0.0);
-  for (int i = 0; i < RAYS; i++) {
-    sum += element(carried, entry * RAYS + i).rgb;
+  for (int i = 0; i < rays_each; i++) {
+    sum += element(carried, entry * rays_each + i).rgb;
   }
-  imageStore(brought, element_position(first_patch + entry), vec4(sum * (3.141592653589793 / float(RAYS)), 0.0));
+  imageStore(brought, element_position(first_patch + entry), vec4(sum * (3.141592653589793 / float(rays_each)), 0.0));
 }

@@ -16,7 +16,7 @@ void main()
   if (bounce != 0) {
     vec3 sum = vec3(0.0);
     int counted = 0;
-    for (int i = patch_index * RAYS; i < (patch_index + 1) * RAYS; i++) {
+    for (int i = patch_index * rays_each; i < (patch_index + 1) * rays_each; i++) {
       int end = int(element(ray_ends, i).x);
       counted += end != -1 ? 1 : 0;
       if (end >= 0) {

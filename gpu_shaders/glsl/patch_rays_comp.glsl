@@ -1,6 +1,6 @@
 /* Rays that leave patches: where they end, what part of the light there comes back, and what light they bring along.
  *
- * Dispatch: one thread a ray from first_ray on, RAYS a patch; groups of 64. Directions are cosine-weighted (Malley), stratified over the
+ * Dispatch: one thread a ray from first_ray on, rays_each a patch; groups of 64. Directions are cosine-weighted (Malley), stratified over the
  * patch; with SEGMENTS above 1 a ray goes on as a path, and direct light is sampled where it bounces.
  * Writes for each ray, counted from first_ray but for `reflected`: hits (position, packed normal; −1 where nothing more can come), `carried` (emission that points
  * on emitters do not answer for, or the world, and direct light at the bounces) and `reflected` (product of the albedos on the way).
@@ -12,9 +12,9 @@ void main()
   if (entry >= ray_count) {
     return;
   }
-  int patch_index = (first_ray + entry) / RAYS;
-  int number = (first_ray + entry) - patch_index * RAYS;
-  vec4 at = element(patch_points, POINTS * patch_index + number * POINTS / RAYS % POINTS);
+  int patch_index = (first_ray + entry) / rays_each;
+  int number = (first_ray + entry) - patch_index * rays_each;
+  vec4 at = element(patch_points, POINTS * patch_index + number * POINTS / rays_each % POINTS);
   vec3 normal = unpack_normal(at.w);
   vec3 origin = leave_surface(at.xyz, normal);
   uvec3 key = uvec3(uint(first_key + patch_index), 0x85EBCA6Bu, uint(seed));
