@@ -118,6 +118,16 @@ bool intersect_triangle(Ray ray, int index, inout Hit hit)
     float swap_child = child[i]; child[i] = child[j]; child[j] = swap_child; \
   }
 
+/* The nearest of what is left becomes `item`; without any the ray ends. */
+#define TAKE_NEXT \
+  do { \
+    if (top == 0) { \
+      return hit; \
+    } \
+    top--; \
+  } while (stack_entry[top] > hit.distance); \
+  item = stack[top];
+
 /* The nearest hit closer than `limit`; triangle −1 and distance `limit` where there is none. */
 Hit trace_within(vec3 origin, vec3 direction, float limit)
 {
@@ -143,26 +153,14 @@ Hit trace_within(vec3 origin, vec3 direction, float limit)
         item = int(child[0]);
       }
       else {
-        do {
-          if (top == 0) {
-            return hit;
-          }
-          top--;
-        } while (stack_entry[top] > hit.distance);
-        item = stack[top];
+        TAKE_NEXT
       }
     }
     int index = -1 - item;
     while (!intersect_triangle(ray, index, hit)) {
       index++;
     }
-    do {
-      if (top == 0) {
-        return hit;
-      }
-      top--;
-    } while (stack_entry[top] > hit.distance);
-    item = stack[top];
+    TAKE_NEXT
   }
 }
 
