@@ -13,7 +13,7 @@ class Quality:
     """A choice of settings and what it is good for.
 
     ``error_percent`` is the relative RMS of irradiance at the gallery's probes against Cycles, from
-    docs/measurements.md ("Gallery"). ``settings`` holds only what a preset decides; the rest stays the user's.
+    docs/measurements/pareto-gallery-h200.txt. ``settings`` holds only what a preset decides; the rest stays the user's.
     """
 
     name: str
@@ -39,7 +39,7 @@ def _decided(face: int, samples: int, gather: int) -> dict:
 
 
 QUALITIES = {
-    "DRAFT": Quality("Draft", "Quick look while things move", 2.8, _decided(8, 1, 0)),
-    "GOOD": Quality("Good", "For most scenes", 2.6, _decided(BakeSettings.face, BakeSettings.samples, 0)),
-    "FINAL": Quality("Final", "Finer faces, four times the rays; several times slower", 2.1, _decided(32, 4, 0)),
+    "DRAFT": Quality("Draft", "Quick look while things move", 3.8, _decided(8, 1, 0)),
+    "GOOD": Quality("Good", "For most scenes", 2.8, _decided(BakeSettings.face, BakeSettings.samples, 0)),
+    "FINAL": Quality("Final", "Finer faces, four times the rays; several times slower", 2.0, _decided(32, 4, 0)),
 }
