@@ -13,8 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core import clearance
 from ..core.blocks import Block, cut
+from ..core.clearance import Obstacles
 from ..core.conventions import ACTIVE, CULLED
 from ..core.emitters import sampling_density
 from ..core.grid import Grid
@@ -55,7 +55,7 @@ class BlockGround:
         self.scene, self.capture, self._pace = scene, capture, pace
         blocks = cut(grid, settings.block)
         self.blocks = [block for block in blocks if len(blocks) == 1 or len(self.active(block))]
-        self._obstacles: np.ndarray | None = None
+        self._obstacles: Obstacles | None = None
 
     @property
     def object_count(self) -> int:
@@ -91,16 +91,13 @@ class BlockGround:
         bake.backend.release_scratch()
         return outcome
 
-    def obstacles(self, block: Block) -> np.ndarray:
-        """(T, 3, 3) what the probes of ``block`` keep clear of: triangles within two cells, no probe reaches others."""
+    def obstacles(self, block: Block) -> Obstacles:
+        """What the probes of ``block`` keep clear of: triangles within two cells, no probe reaches others."""
         if self._obstacles is None:
-            self._obstacles = clearance.obstacles(self.grid, self.snapshot)
-        if block.is_whole or not len(self._obstacles):
+            self._obstacles = Obstacles.of(self.grid, self.snapshot)
+        if block.is_whole:
             return self._obstacles
-        to_lattice = self.grid.world_to_lattice()
-        lattice = self._obstacles @ to_lattice[:, :3].T + to_lattice[:, 3]
-        low, high = np.array(block.low) - 2, np.array(block.high) + 1
-        return self._obstacles[((lattice.max(axis=1) >= low) & (lattice.min(axis=1) <= high)).all(axis=1)]
+        return self._obstacles.within(np.array(block.low) - 2, np.array(block.high) + 1)
 
     def follow_lamps(self, snapshot: SceneSnapshot, open_blocks: list[VolumeBake]) -> Steps[None]:
         """The same scene in the light of other lamps: ``open_blocks`` go back to where ``see`` begins."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import clearance, relocation
+from ..core.clearance import Obstacles
 from ..core.grid import Grid
 from ..core.orientation import ShellVote
 from ..core.steps import Steps
@@ -32,8 +33,8 @@ class Placement:
     light_elsewhere: bool = False  # probes of other blocks see light
 
     @classmethod
-    def at_home(cls, grid: Grid, nodes: np.ndarray, by_hand_m: np.ndarray, obstacles: np.ndarray) -> Placement:
-        """Clear of ``obstacles`` (T, 3, 3), else nothing is known yet; ``by_hand_m`` (P, 3) are the user's own moves of
+    def at_home(cls, grid: Grid, nodes: np.ndarray, by_hand_m: np.ndarray, obstacles: Obstacles) -> Placement:
+        """Clear of ``obstacles``, else nothing is known yet; ``by_hand_m`` (P, 3) are the user's own moves of
         all probes of the grid."""
         count = len(nodes)
         by_hand = by_hand_m[nodes].any(axis=1)
@@ -108,12 +109,12 @@ def place(
     batches: Batches,
     backend: GpuBackend,
     grid: Grid,
-    obstacles: Callable[[], np.ndarray],
+    obstacles: Callable[[], Obstacles],
     verdict: ShellVote,
 ) -> Steps[None]:
     """Fills ``placement`` from texel surfaces captured at home whose patches have direct light.
 
-    ``obstacles()`` (T, 3, 3): what to keep clear of.
+    ``obstacles()``: what to keep clear of.
     """
     yield from judge(placement, batches, backend, verdict)
     placement.remember_misplaced()
@@ -130,7 +131,7 @@ def _statistics(batches: Batches, index: int, backend: GpuBackend) -> Steps[None
 
 
 def _relocate(
-    placement: Placement, batches: Batches, backend: GpuBackend, grid: Grid, obstacles: Callable[[], np.ndarray]
+    placement: Placement, batches: Batches, backend: GpuBackend, grid: Grid, obstacles: Callable[[], Obstacles]
 ) -> Steps[None]:
     """Moves probes that stand in or behind walls. One that still does at its new place goes back; one that came out
     into a dark room stays, or the wall of that room would be left to probes of the lit one next door. Where they came

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core import clearance
 from ..core.blocks import Block
+from ..core.clearance import Obstacles
 from ..core.conventions import ACTIVE
 from ..core.grid import Grid
 from ..core.orientation import ShellVote
@@ -41,7 +41,7 @@ class Part:
     block: Block
     state: np.ndarray  # (P,) before capture: no node outside the block is active
     capture: str  # "raster" or "trace"
-    obstacles: np.ndarray  # (T, 3, 3) what its probes keep clear of
+    obstacles: Obstacles  # what its probes keep clear of
 
 
 class VolumeBake:
@@ -75,7 +75,7 @@ class VolumeBake:
         self._stopwatch = stopwatch or Stopwatch({})
         self._stopwatch.seconds = self.result.seconds
         self._pace = pace or Pace(None)
-        self._obstacles_of: tuple[SceneSnapshot | None, np.ndarray] = (None, np.zeros((0, 3, 3)))
+        self._obstacles_of: tuple[SceneSnapshot, Obstacles] | None = None
         self.unshown = np.zeros(0, bool)  # (S,): probes whose light has changed since ``show`` was there
         self._scene = scene
         self._part = part
@@ -129,12 +129,12 @@ class VolumeBake:
             return self._part.state
         return cull(self.snapshot, self.grid, self.settings, self._edits)
 
-    def _obstacles(self) -> np.ndarray:
+    def _obstacles(self) -> Obstacles:
         """What probes keep clear of; found once per state of the scene."""
         if self._part is not None:
             return self._part.obstacles
-        if self._obstacles_of[0] is not self.snapshot:
-            self._obstacles_of = (self.snapshot, clearance.obstacles(self.grid, self.snapshot))
+        if self._obstacles_of is None or self._obstacles_of[0] is not self.snapshot:
+            self._obstacles_of = (self.snapshot, Obstacles.of(self.grid, self.snapshot))
         return self._obstacles_of[1]
 
     def _stand_at_home(self) -> Steps[None]:

@@ -13,6 +13,8 @@ tell (core/orientation.py): it stays until the bake knows.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .cell_ranges import cells_of_boxes
@@ -28,47 +30,88 @@ _STEPS = 4  # away from the nearest surface each: three meet in a corner
 _PAIRS_AT_ONCE = 1 << 19
 
 
-def obstacles(grid: Grid, snapshot: SceneSnapshot) -> np.ndarray:
-    """(T, 3, 3) triangles of ``snapshot`` to keep clear of: those of objects larger than the clearance, but no needles.
-    Dust, leaves and threads hide nothing from a probe beside them."""
-    corners = snapshot.triangle_positions
-    large = np.zeros(max(len(snapshot.object_names), 1), bool)
-    by_object = np.argsort(snapshot.object_index, kind="stable")
-    present, first = np.unique(snapshot.object_index[by_object], return_index=True)
-    if len(present):
-        low, high = bounds(corners)
-        low = np.minimum.reduceat(low[by_object], first)
-        high = np.maximum.reduceat(high[by_object], first)
-        large[present] = np.linalg.norm(high - low, axis=1) > CLEARANCE * grid.cell_size().min()
-    edges = np.roll(corners, -1, axis=1) - corners
-    doubled_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-    thick = doubled_area > _TOUCH * grid.cell_size().min() * np.linalg.norm(edges, axis=2).max(axis=1)
-    return corners[large[snapshot.object_index] & thick]
+@dataclass(frozen=True)
+class Obstacles:
+    """T triangles that the probes of a grid keep clear of."""
+
+    triangles: np.ndarray  # (T, 3, 3) world metres
+    low: np.ndarray  # (T, 3) lattice coordinates of a box around each, somewhat larger where the grid is turned
+    high: np.ndarray  # (T, 3)
+
+    @classmethod
+    def all_of(cls, grid: Grid, triangles: np.ndarray) -> Obstacles:
+        """Every one of ``triangles`` (T, 3, 3)."""
+        return cls(triangles, *_in_lattice(grid, *bounds(triangles)))
+
+    @classmethod
+    def of(cls, grid: Grid, snapshot: SceneSnapshot) -> Obstacles:
+        """The triangles of objects larger than the clearance: dust, leaves and threads hide nothing from a probe beside
+        them."""
+        triangles = snapshot.triangle_positions
+        low, high = bounds(triangles)
+        starts = np.flatnonzero(np.diff(snapshot.object_index, prepend=-1))  # of runs of triangles of one object
+        lowest, highest = np.full((2, max(len(snapshot.object_names), 1), 3), [[[np.inf]], [[-np.inf]]])
+        if len(starts):
+            objects = snapshot.object_index[starts]
+            np.minimum.at(lowest, objects, np.minimum.reduceat(low, starts))
+            np.maximum.at(highest, objects, np.maximum.reduceat(high, starts))
+        large = np.linalg.norm(highest - lowest, axis=1) > CLEARANCE * grid.cell_size().min()
+        found = cls(triangles, *_in_lattice(grid, low, high))
+        return found if large.all() else found._chosen(large[snapshot.object_index])
+
+    def within(self, low: np.ndarray, high: np.ndarray) -> Obstacles:
+        """Those that reach into the box ``low`` .. ``high`` (3,) of the lattice."""
+        return self._chosen(((self.high >= low) & (self.low <= high)).all(axis=1))
+
+    def _chosen(self, which: np.ndarray) -> Obstacles:
+        return Obstacles(self.triangles[which], self.low[which], self.high[which])
+
+
+def _in_lattice(grid: Grid, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest (N, 3) lattice coordinates of the boxes ``low`` .. ``high`` (N, 3), world metres."""
+    to_lattice = grid.world_to_lattice()
+    centre = (low + high) @ (to_lattice[:, :3].T / 2) + to_lattice[:, 3]
+    half = (high - low) @ (np.abs(to_lattice[:, :3]).T / 2)
+    return centre - half, centre + half
 
 
 def keep_clear(
     grid: Grid,
     nodes: np.ndarray,
     positions: np.ndarray,
-    triangles: np.ndarray,
+    obstacles: Obstacles,
     also_behind: bool = False,
     near: float = NEAR,
 ) -> np.ndarray:
-    """(L, 3) ``positions`` (L, 3) of the probes at grid ``nodes`` (L,), moved away from ``triangles`` (T, 3, 3); world
-    metres.
+    """(L, 3) ``positions`` (L, 3) of the probes at grid ``nodes`` (L,), moved away from ``obstacles``; world metres.
 
     Args:
         near: cells; probes nearer than this to a surface move.
         also_behind: probes behind their nearest surface move too, away from it, because they are known to be in a room.
     """
+    cell = float(grid.cell_size().min())
+    near_ones = np.unique(_near_pairs(grid, nodes, positions, obstacles, near * cell)[0])  # few, as a rule
+    moved = positions.copy()
+    moved[near_ones] = _moved_away(grid, nodes[near_ones], positions[near_ones], obstacles, also_behind, near * cell)
+    return moved
+
+
+def _moved_away(
+    grid: Grid, nodes: np.ndarray, positions: np.ndarray, obstacles: Obstacles, also_behind: bool, near: float
+) -> np.ndarray:
+    """``keep_clear`` for probes that may all be nearer than ``near`` metres to a surface."""
     clearance = CLEARANCE * float(grid.cell_size().min())
     touch = _TOUCH * float(grid.cell_size().min())
-    probe, triangle = _near_pairs(grid, nodes, positions, triangles, clearance)
-    if not len(probe):
+    # After a step away from one surface the next one counts.
+    probe, triangle = _near_pairs(grid, nodes, positions, obstacles, 2 * clearance)
+    corners = obstacles.triangles[triangle]
+    edges = np.roll(corners, -1, axis=1) - corners
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    doubled_area = np.linalg.norm(normals, axis=1)
+    thick = doubled_area > touch * np.linalg.norm(edges, axis=2).max(axis=1)  # needles hide nothing either
+    if not thick.any():
         return positions
-    corners = triangles[triangle]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    probe, corners, normals = probe[thick], corners[thick], normals[thick] / doubled_area[thick, None]
     moved = positions.copy()
     free = np.zeros(len(positions), bool)
     for step in range(_STEPS):
@@ -85,7 +128,7 @@ def keep_clear(
         )
         if step == 0:
             in_front = touches | (np.einsum("li,li->l", away, normal) > -1e-6)
-            free[at] = (length < near * float(grid.cell_size().min())) & (in_front | also_behind)
+            free[at] = (length < near) & (in_front | also_behind)
         moves = free[at] & (length < clearance)
         if not moves.any():
             break
@@ -156,33 +199,30 @@ def _crosses(start: np.ndarray, end: np.ndarray, triangles: np.ndarray, touch: f
 
 
 def _near_pairs(
-    grid: Grid, nodes: np.ndarray, positions: np.ndarray, triangles: np.ndarray, reach: float
+    grid: Grid, nodes: np.ndarray, positions: np.ndarray, obstacles: Obstacles, reach: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Row of ``nodes`` and triangle of every pair whose bounds come nearer than twice ``reach`` metres: after a step
-    away from one surface the next one counts."""
-    low_of, high_of = bounds(triangles)
-    to_lattice = grid.world_to_lattice()
+    """Row of ``nodes`` and triangle of every pair that is nearer than ``reach`` metres."""
     row_of = np.full(grid.count, -1)
     row_of[nodes] = np.arange(len(nodes))
     offset = positions - grid.positions()[nodes]
-    most = 2 * reach + float(np.sqrt((offset**2).sum(axis=1)).max(initial=0.0))
-    margin = most * np.linalg.norm(to_lattice[:, :3], axis=1)
-    lattice = triangles @ to_lattice[:, :3].T + to_lattice[:, 3]
+    most = reach + float(np.sqrt((offset**2).sum(axis=1)).max(initial=0.0))
+    margin = most * np.linalg.norm(grid.world_to_lattice()[:, :3], axis=1)
     resolution = np.array(grid.resolution)
-    lowest, highest = bounds(lattice)
-    first = np.maximum(np.ceil(lowest - margin), 0).astype(np.int64)
-    last = np.minimum(np.floor(highest + margin), resolution - 1).astype(np.int64)
+    first = np.maximum(np.ceil(obstacles.low - margin), 0)
+    last = np.minimum(np.floor(obstacles.high + margin), resolution - 1)
     near = np.flatnonzero((first <= last).all(axis=1))
+    first, last = first[near].astype(np.int64), last[near].astype(np.int64)
     found = [(np.zeros(0, np.int64), np.zeros(0, np.int64))]
-    for which, node in cells_of_boxes(first[near], last[near], _PAIRS_AT_ONCE):
+    for which, node in cells_of_boxes(first, last, _PAIRS_AT_ONCE):
         i, j, k = node.T
         row, triangle = row_of[i + resolution[0] * (j + resolution[1] * k)], near[which]
         row, triangle = row[row >= 0], triangle[row >= 0]
         place = positions[row]
-        close = ((low_of[triangle] - place < 2 * reach) & (place - high_of[triangle] < 2 * reach)).all(axis=1)
+        low, high = bounds(obstacles.triangles[triangle])
+        close = ((low - place < reach) & (place - high < reach)).all(axis=1)
         row, triangle = row[close], triangle[close]
-        apart = np.linalg.norm(positions[row] - nearest_points(triangles[triangle], positions[row]), axis=1)
-        found.append((row[apart < 2 * reach], triangle[apart < 2 * reach]))
+        apart = np.linalg.norm(positions[row] - nearest_points(obstacles.triangles[triangle], positions[row]), axis=1)
+        found.append((row[apart < reach], triangle[apart < reach]))
     rows, near_triangles = zip(*found)
     return np.concatenate(rows), np.concatenate(near_triangles)
 

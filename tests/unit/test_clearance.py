@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from gridlight.core.clearance import CLEARANCE, keep_clear, nearest_points, obstacles
+from gridlight.core.clearance import CLEARANCE, Obstacles, keep_clear, nearest_points
 from gridlight.core.grid import Grid
 from gridlight.core.snapshot import Material, SceneSnapshot, World
 
@@ -22,7 +22,7 @@ INSIDE_OUT = box([0] * 3, [4] * 3)[:, ::-1]  # a room of 4 m: its front is insid
 def cleared(grid, triangles, near=CLEARANCE, **options):
     """All that are nearer than the clearance move, unless a test asks for less."""
     nodes = np.arange(grid.count)
-    return keep_clear(grid, nodes, grid.positions(), triangles, near=near, **options)
+    return keep_clear(grid, nodes, grid.positions(), Obstacles.all_of(grid, triangles), near=near, **options)
 
 
 def distance_to(triangles, points):
@@ -99,7 +99,7 @@ def test_dust_is_no_obstacle():
         world=World(),
     )
     grid = Grid.from_bounds([0] * 3, [4] * 3, (5, 5, 5))
-    np.testing.assert_array_equal(obstacles(grid, snapshot), INSIDE_OUT)
+    np.testing.assert_array_equal(Obstacles.of(grid, snapshot).triangles, INSIDE_OUT)
 
 
 @pytest.mark.parametrize("seed", range(5))
