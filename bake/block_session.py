@@ -154,13 +154,12 @@ class BlockSession:
         """
         self.result.warnings.clear()
         check_scene(self.snapshot, self.result)
-        self._reporter.phase("cull")
-        culling = self._pace.in_background(cull, self.snapshot, self.grid, self.settings, self._edits)
-        state = yield from self._stopwatch.steps("cull", culling)
+        culling = self._pace.meanwhile(cull, self.snapshot, self.grid, self.settings, self._edits)
         self._reporter.phase("upload")
         density = yield from self._pace.in_background(sampling_density, self.snapshot, self.grid)
         making = SceneTextures.make(self.snapshot, self.grid.center, density, self._pace)
         scene = yield from self._stopwatch.steps("setup", making)
+        state = yield from self._stopwatch.steps("cull", culling)
         probes = int((state == ACTIVE).sum())
         capture, reason = choose_capture(self.settings, scene.triangle_count, probes)
         self.result.scene, self.result.capture = scene, capture

@@ -99,14 +99,13 @@ class VolumeBake:
     def open(self) -> Steps[None]:
         """What a bake begins with: the scene on the GPU, and which probes capture, at home."""
         result = self.result
-        self._reporter.phase("cull")
-        self._state = yield from self._stopwatch.steps("cull", self._pace.in_background(self._cull))
-        yield
+        placing = self._pace.meanwhile(self._cull_and_place)  # beside the scene's way to the GPU
         self._reporter.phase("upload")
         block = None if self._part is None else self._part.block
         making = GpuBackend.make(self.snapshot, self.grid, self.settings, self._pace, self._scene, block)
         self.backend = yield from self._stopwatch.steps("setup", making)
         yield
+        self._state, placement = yield from self._stopwatch.steps("cull", placing)
         result.scene = self.backend.scene
         if self._part is None:
             triangles, probes = self.backend.scene.triangle_count, int((self._state == ACTIVE).sum())
@@ -121,7 +120,11 @@ class VolumeBake:
                 f"texel surfaces of {len(self._batches.nodes)} probes exceed the memory budget of "
                 f"{self.settings.memory_mib} MiB: they are captured again whenever they are needed"
             )
-        yield from self._stand_at_home()
+        self._stand(placement)
+
+    def _cull_and_place(self) -> tuple[np.ndarray, Placement]:
+        state = self._cull()
+        return state, self._at_home(np.flatnonzero(state == ACTIVE))
 
     def _cull(self) -> np.ndarray:
         """(P,) uint8 states before capture: ACTIVE or CULLED."""
@@ -139,13 +142,15 @@ class VolumeBake:
 
     def _stand_at_home(self) -> Steps[None]:
         """Puts the probes of all slots where they belong, with no light yet."""
-        nodes = self._batches.nodes
+        work = self._pace.in_background(self._at_home, self._batches.nodes)
+        self._stand((yield from self._stopwatch.steps("cull", work)))
 
-        def at_home() -> Placement:
-            return Placement.at_home(self.grid, nodes, self._edits.offset, self._obstacles())
+    def _at_home(self, nodes: np.ndarray) -> Placement:
+        return Placement.at_home(self.grid, nodes, self._edits.offset, self._obstacles())
 
-        self._placement = yield from self._stopwatch.steps("cull", self._pace.in_background(at_home))
-        self.backend.set_probes(self._batches.nodes, self._placement.home)
+    def _stand(self, placement: Placement) -> None:
+        self._placement = placement
+        self.backend.set_probes(placement.nodes, placement.home)
         self.backend.allocate_field()
 
     def see(self) -> Steps[ShellVote]:

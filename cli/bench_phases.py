@@ -16,10 +16,9 @@ from ..gpu_shaders.textures import wait_for_gpu
 
 # (phase of the reporter, phase of the stopwatch) -> name in tables
 _NAMES = {
-    ("cull", "cull"): "cull",
     ("upload", "setup"): "hierarchy, upload",
-    ("upload", "cull"): "placement",
-    ("capture", "cull"): "placement",
+    ("upload", "cull"): "culling, placement",
+    ("capture", "cull"): "culling, placement",
     ("capture", "capture"): "capture",
     ("capture", "light"): "finding patches",
     ("light", "light"): "light of patches",

@@ -86,6 +86,11 @@ class Pace:
         Blender's data nor the GPU. Where steps are not followed to their end, it ends by itself."""
         if self._seconds is None:
             return work(*arguments)
+        return (yield from self.meanwhile(work, *arguments))
+
+    def meanwhile(self, work: Callable[..., Result], *arguments: Any) -> Steps[Result]:
+        """Begins ``work(*arguments)`` in a thread of its own at once, at any pace, under the terms of
+        ``in_background``; the steps wait for what it returns."""
         box: dict[str, Any] = {}
 
         def compute() -> None:
@@ -96,8 +101,11 @@ class Pace:
 
         thread = threading.Thread(target=compute, daemon=True, name=f"gridlight {work.__name__}")
         thread.start()
+        return self._wait_for(thread, box)
+
+    def _wait_for(self, thread: threading.Thread, box: dict[str, Any]) -> Steps[Any]:
         while True:
-            thread.join(_LOOK_SECONDS)
+            thread.join(None if self._seconds is None else _LOOK_SECONDS)
             if not thread.is_alive():
                 break
             yield

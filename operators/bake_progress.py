@@ -8,10 +8,9 @@ import time
 from ..core.settings import BakeSettings
 
 # Phases in order, with the share of a volume's bake that each takes about.
-_SHARES = {"read": 0.05, "cull": 0.05, "upload": 0.1, "capture": 0.3, "light": 0.3, "project": 0.1, "gather": 0.4}
+_SHARES = {"read": 0.05, "upload": 0.15, "capture": 0.3, "light": 0.3, "project": 0.1, "gather": 0.4}
 _TITLES = {
     "read": "Reading the scene",
-    "cull": "Culling probes",
     "upload": "Sending the scene",
     "capture": "Capturing",
     "light": "Bouncing light",

@@ -57,6 +57,15 @@ def test_background_work_returns_and_raises():
     assert run(Pace(None).in_background(threading.current_thread)) is threading.current_thread()
 
 
+@pytest.mark.parametrize("seconds", [None, 0.01])
+def test_work_begins_before_its_steps_are_followed(seconds):
+    begun, pace = threading.Event(), Pace(seconds)
+    steps = pace.meanwhile(lambda: begun.set() or 7)
+    assert begun.wait(10) and run(steps) == 7
+    with pytest.raises(ZeroDivisionError):
+        run(pace.meanwhile(lambda: 1 / 0))
+
+
 def test_together_goes_in_lockstep_and_gives_all_results():
     seen = []
 
