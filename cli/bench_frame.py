@@ -49,8 +49,13 @@ def table(summary: dict) -> list[str]:
         lines += bench_table.columns([["phase", "ms"], *[[k, _ms(v)] for k, v in summary["longest_steps"].items()]])
     for row in summary["rows"]:
         if "phases" in row:
-            lines += ["", f"{row['run']}: {row['patches']} patches, {row['iterations']} bounces; ms a relight"]
-            rest = row["median"] - sum(row["phases"].values())
+            watched = row["watched_seconds"]
+            lines += [
+                "",
+                f"{row['run']}: {row['patches']} patches, {row['iterations']} bounces. With a wait after every piece "
+                f"of work it takes {_ms(watched)} ms, of which",
+            ]
+            rest = watched - sum(row["phases"].values())
             phases = {**row["phases"], "outside of all phases": rest}
             lines += bench_table.columns([["phase", "ms"], *[[name, _ms(value)] for name, value in phases.items()]])
     if summary["shaders"]:

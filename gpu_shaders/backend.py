@@ -254,6 +254,7 @@ class GpuBackend:
     def release_scratch(self) -> None:
         """Lets go of what only a capture needs."""
         self._hits = self._raster = None
+        self.light.release_scratch()
 
     def bind(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> Steps[None]:
         """Finds the patches on which the texels of all or of ``count`` probes from ``start`` lie, in steps."""

@@ -240,23 +240,33 @@ def patch_spread_comp(info, defines):
     return {"compute": ["data_lib", "octahedral_lib", *_light_files(defines), "patch_spread_comp"]}
 
 
+def _patch_lists(info) -> None:
+    """What patch_lists_lib reads but `patches`."""
+    for name in ("list_first", "list_count", "list_samples"):
+        info.push_constant("IVEC4", name)
+
+
 def patch_direct_comp(info, defines):
     slot = _scene(info, defines, attributes="HAS_EMITTERS" in defines)
     slot = _emitters(info, defines, slot)
     _samplers(info, "lights", "patches", "patch_points", first=slot)
     _image(info, 0, "sums")
-    _ints(info, "first_entry", "patch_count", "runs", "first_key", "first_light", "light_count", "samples", "seed")
+    _patch_lists(info)
+    _ints(info, "first_key", "first_light", "light_count", "seed")
     info.define("FIRST_LIGHT", "first_light")
     info.local_group_size(64, 1, 1)
-    return {"compute": ["data_lib", "octahedral_lib", *_light_files(defines), "patch_direct_comp"]}
+    return {
+        "compute": ["data_lib", "octahedral_lib", *_light_files(defines), "patch_lists_lib", "patch_direct_comp"]
+    }
 
 
 def patch_mean_comp(info, defines):
     _samplers(info, "patches", "sums")
     _image(info, 0, "direct", access="READ+WRITE")
-    _ints(info, "first_entry", "patch_count", "runs", "samples", "begins")
+    _patch_lists(info)
+    _ints(info, "begins")
     info.local_group_size(64, 1, 1)
-    return {"compute": ["data_lib", "patch_mean_comp"]}
+    return {"compute": ["data_lib", "patch_lists_lib", "patch_mean_comp"]}
 
 
 def patch_rays_comp(info, defines):
@@ -303,13 +313,18 @@ def patch_iterate_comp(info, defines):
     return {"compute": ["data_lib", "patch_iterate_comp"]}
 
 
+def _one_group(info) -> None:
+    """A group as large as every device takes, which goes over all there is."""
+    info.define("THREADS", "1024")
+    info.local_group_size(1024, 1, 1)
+
+
 def patch_change_comp(info, defines):
-    _samplers(info, "irradiance_new", "irradiance_old", "irradiance_older", "patch_seen")
+    _samplers(info, "irradiance_new", "irradiance_old", "irradiance_older", "patch_seen", "brightest")
     _image(info, 0, "change")
     _ints(info, "patch_count")
-    info.push_constant("FLOAT", "scale")
     info.push_constant("FLOAT", "unseen")
-    info.local_group_size(256, 1, 1)
+    _one_group(info)
     return {"compute": ["data_lib", "patch_change_comp"]}
 
 

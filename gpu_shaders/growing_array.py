@@ -20,10 +20,20 @@ def copy_elements(source: gpu.types.GPUTexture, target: gpu.types.GPUTexture, pi
     dispatch_linear(shader, count)
 
 
-def fill_elements(target: gpu.types.GPUTexture, first: int, count: int, value: float) -> None:
-    """Sets ``count`` elements of ``target`` (R32F) from ``first`` on to ``value``."""
-    shader = program("fill_elements_comp")
+def fill_elements(
+    target: gpu.types.GPUTexture,
+    first: int,
+    count: int,
+    value: float,
+    factor: tuple[gpu.types.GPUTexture, int] | None = None,
+) -> None:
+    """Sets ``count`` elements of ``target`` (R32F) from ``first`` on to ``value``, times an element of another array if
+    that is given as ``factor``: array and index."""
+    shader = program("fill_elements_comp", TIMES=factor is not None)
     shader.image("target", target)
+    if factor is not None:
+        shader.uniform_sampler("factors", factor[0])
+        shader.uniform_int("factor", (factor[1],))
     shader.uniform_int("first", (first,))
     shader.uniform_int("count", (count,))
     shader.uniform_float("value", value)
@@ -61,3 +71,27 @@ class GrowingArray:
         texture = scratch(self.capacity, self._what, self._pixel)
         texture.clear(format="FLOAT", value=(float(self._fill),) * (4 if self._pixel.startswith("RGBA") else 1))
         return texture
+
+
+class Scratch:
+    """Small arrays whose content nobody asks for later, by name: the same textures again and again, because making one
+    takes as long as a small dispatch."""
+
+    _MOST_ELEMENTS = 1 << 19  # of an array that is kept
+
+    def __init__(self) -> None:
+        self._kept: dict[str, gpu.types.GPUTexture] = {}
+
+    def __call__(self, name: str, elements: int, what: str, pixel: str = "RGBA32F") -> gpu.types.GPUTexture:
+        """At least ``elements`` without defined content. What ``name`` stood for before must have served its turn."""
+        kept = self._kept.get(name)
+        if kept is not None and kept.width * kept.height >= elements:
+            return kept
+        texture = scratch(elements, what, pixel)
+        if elements <= self._MOST_ELEMENTS:
+            self._kept[name] = texture
+        return texture
+
+    def release(self) -> None:
+        """Lets go of all of them."""
+        self._kept.clear()

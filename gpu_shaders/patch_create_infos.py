@@ -5,7 +5,7 @@ create_infos.py."""
 from __future__ import annotations
 
 from ..core.patches import DARK, ERRORS, POINTS, SHADOWED
-from .create_infos import _image, _ints, _samplers, _scene, _surface_files
+from .create_infos import _image, _ints, _one_group, _samplers, _scene, _surface_files
 
 
 def _atomic(info, slot: int, name: str) -> None:
@@ -153,6 +153,9 @@ def fill_elements_comp(info, defines):
     _image(info, 0, "target", pixel="R32F")
     _ints(info, "first", "count")
     info.push_constant("FLOAT", "value")
+    if "TIMES" in defines:
+        _samplers(info, "factors")
+        _ints(info, "factor")
     info.local_group_size(64, 1, 1)
     return {"compute": ["data_lib", "fill_elements_comp"]}
 
@@ -161,12 +164,12 @@ def patch_reduce_comp(info, defines):
     _samplers(info, "values", *(["others"] if "LARGEST" in defines else []))
     _image(info, 0, "results", pixel="R32F")
     _ints(info, "first", "stop", "result")
-    info.local_group_size(256, 1, 1)
+    _one_group(info)
     return {"compute": ["data_lib", "patch_reduce_comp"]}
 
 
 def patch_add_comp(info, defines):
-    _samplers(info, "added")
+    _samplers(info, *(f"term{number}" for number in range(defines["TERMS"])))
     _image(info, 0, "total", access="READ+WRITE")
     _ints(info, "patch_count", "begins")
     info.local_group_size(64, 1, 1)

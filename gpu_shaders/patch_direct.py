@@ -14,15 +14,18 @@ from ..core.patches import ALL, EMITTERS, POINTS, SAMPLES, Part, light_parts
 from ..core.settings import BakeSettings
 from ..core.steps import Pace, Steps
 from .dispatch import COMPACTION_BLOCK, dispatch_linear
-from .growing_array import GrowingArray, fill_elements
+from .growing_array import GrowingArray, Scratch, fill_elements
 from .programs import program
 from .scene_textures import SceneTextures
-from .textures import read, scratch
+from .textures import read
 
 _SAMPLES_EACH = 2  # of one lamp, or of emitters, that a thread takes
 _LAMPS_AT_ONCE = 32  # that a thread takes
-_THREADS_AT_ONCE = 1 << 20
+_SAMPLES_AT_ONCE = 1 << 20
+_MOST_LISTS, _MOST_TERMS = 4, 4  # that a shader takes
 _UNLIT = -1  # in place of an index into SAMPLES
+
+_List = tuple[int, int, int]  # of patches: its first entry in an array of them, its entries, samples that each gets
 
 
 class _PartLight:
@@ -34,7 +37,7 @@ class _PartLight:
         self.classes = GrowingArray("patches", "R32F")  # index into SAMPLES that ``values`` were taken with
 
     def grow(self, first: int, stop: int) -> None:
-        """Adds patches ``first`` .. ``stop``, which are not lit yet."""
+        """Adds patches ``first`` .. ``stop``, or begins again with them; they are not lit yet."""
         for array in (self.values, self.spread, self.classes):
             array.reserve(stop)
         fill_elements(self.classes.texture, first, stop - first, _UNLIT)
@@ -51,6 +54,7 @@ class PatchDirect:
         self._total = GrowingArray("patches")
         self._total.reserve(0)
         self._mean_lights = GrowingArray("patches", "R32F")
+        self.scratch = Scratch()
 
     @property
     def count(self) -> int:
@@ -84,7 +88,7 @@ class PatchDirect:
             if part in before and not differs:
                 self._parts[part] = before[part]
                 continue
-            light = self._parts[part] = _PartLight()
+            light = self._parts[part] = before.get(part) or _PartLight()
             light.grow(0, self.count)
             self.find_spread(part, points, 0, self.count, light.spread.texture)
             lamps += part[1] - part[0] if isinstance(part, tuple) else 0
@@ -104,37 +108,36 @@ class PatchDirect:
             self._add_up()
             return
         lights, classes, parts = self._lights_together(), len(SAMPLES), list(self._parts.items())
-        counts = scratch(len(parts) * classes, "patches", "R32F")
-        lists = [self._list_due(light, lights, counts, row * classes) for row, (_part, light) in enumerate(parts)]
+        counts = self.scratch("counts", len(parts) * classes, "patches", "R32F")
+        lists = [self._list_due(light, lights, counts, row, row * classes) for row, (_part, light) in enumerate(parts)]
         lengths = read(counts, len(parts) * classes, channels=1).reshape(-1, classes).astype(int)
-        for (part, light), due, numbers in zip(parts, lists, lengths):
-            for index, number in enumerate(numbers):
-                if number:
-                    samples, first = SAMPLES[index] * self.effort, index * self.count
-                    target = light.values.texture
-                    yield from self.light(
-                        points, POINTS, due, int(number), samples, target, part=part, first_entry=first
-                    )
+        for (part, light), due, numbers in zip(parts, lists, lengths.tolist()):
+            entries = [
+                (index * self.count, number, samples * self.effort)
+                for index, (number, samples) in enumerate(zip(numbers, SAMPLES))
+            ]
+            yield from self.light(points, POINTS, due, entries, light.values.texture, part=part)
         self._add_up()
 
     def _lights_together(self) -> gpu.types.GPUTexture:
         """What errors are held against: the mean that all parts send to each patch, and in ``_mean_lights`` the mean of
         that by range of patches."""
-        lights, sums = scratch(self.count, "patches"), scratch(len(self._together), "patches", "R32F")
+        lights = self.scratch("lights", self.count, "patches")
+        sums = self.scratch("sums of lights", len(self._together), "patches", "R32F")
         add_patches(lights, self.count, [light.spread.texture for light in self._parts.values()])
+        target = self._mean_lights.reserve(self.count)
         for row, (first, stop) in enumerate(self._together):
             reduce_patches(lights, first, stop, sums, row)
-        target = self._mean_lights.reserve(self.count)
-        for (first, stop), total in zip(self._together, read(sums, len(self._together), channels=1)[:, 0].tolist()):
-            fill_elements(target, first, stop - first, total / max(stop - first, 1))
+            fill_elements(target, first, stop - first, 1.0 / max(stop - first, 1), factor=(sums, row))
         return lights
 
-    def _list_due(self, light: _PartLight, lights, counts, first: int) -> gpu.types.GPUTexture:
-        """Patches that ``light`` should light with each of SAMPLES and has not yet, marked as lit so: lists of
-        ``count`` elements one after the other. Their lengths go into elements of ``counts`` from ``first`` on."""
+    def _list_due(self, light: _PartLight, lights, counts, row: int, first: int) -> gpu.types.GPUTexture:
+        """Patches that ``light``, the part in ``row``, should light with each of SAMPLES and has not yet, marked as lit
+        so: lists of ``count`` elements one after the other. Their lengths go into elements of ``counts`` from ``first``
+        on."""
         blocks = max(-(-self.count // COMPACTION_BLOCK), 1)
-        block_counts = scratch(blocks * len(SAMPLES), "patches", "R32F")
-        due = scratch(self.count * len(SAMPLES), "patches", "R32F")
+        block_counts = self.scratch("block counts", blocks * len(SAMPLES), "patches", "R32F")
+        due = self.scratch(f"due {row}", self.count * len(SAMPLES), "patches", "R32F")
         for name in ("compact_count_comp", "patch_due_comp"):
             shader = program(name, DUE=name == "compact_count_comp")
             shader.uniform_sampler("spread", light.spread.texture)
@@ -178,27 +181,23 @@ class PatchDirect:
         points,
         points_each: int,
         chosen,
-        count: int,
-        samples: int,
+        lists: list[_List],
         target,
         first_key: int = 0,
         part: Part = ALL,
-        first_entry: int = 0,
     ) -> Steps[None]:
-        """Direct light by ``part`` of ``count`` patches or texels, whose numbers are in ``chosen`` from ``first_entry``
-        on, with ``points_each`` places in ``points``, into ``target``; in steps."""
+        """Direct light by ``part`` of the patches or texels in ``lists`` of ``chosen``, with ``points_each`` places in
+        ``points``, into ``target``; in steps."""
+        work = sum(count * samples for _first, count, samples in lists)
         for begins, portion in enumerate(self._portions(part)):
             lamps = portion[1] - portion[0] if isinstance(portion, tuple) else 1
             samples_each = max(1, _SAMPLES_EACH // lamps)
-            at_once = max(1, _THREADS_AT_ONCE // -(-samples // samples_each))
 
             def light(start: int, number: int, portion=portion, samples_each=samples_each, begins=begins == 0) -> None:
-                some = (first_entry + start, number)
-                self._light_portion(
-                    portion, points, points_each, chosen, some, samples, samples_each, target, first_key, begins
-                )
+                some = _cut(lists, start, start + number)
+                self._light_portion(portion, points, points_each, chosen, some, samples_each, target, first_key, begins)
 
-            yield from self._pace.portions(f"direct {samples}", count, light, 1024, at_once)
+            yield from self._pace.portions("direct", work, light, 4096, _SAMPLES_AT_ONCE)
 
     def _portions(self, part: Part) -> list[Part]:
         """``part`` in portions small enough for one thread, see patch_direct_comp.glsl."""
@@ -214,44 +213,31 @@ class PatchDirect:
         points,
         points_each: int,
         chosen,
-        some: tuple[int, int],
-        samples: int,
+        lists: list[_List],
         samples_each: int,
         target,
         first_key: int,
         begins: bool,
     ) -> None:
-        first_entry, count = some
-        runs = -(-samples // samples_each)
-        sums = scratch(count * runs, "patches")
+        entries = sum(count for _first, count, _samples in lists)
+        if not entries:
+            return
+        threads = sum(count * -(-samples // samples_each) for _first, count, samples in lists)
+        sums = self.scratch("sums", threads, "samples")
         shader = program("patch_direct_comp", POINTS=points_each, SAMPLES_EACH=samples_each, **self._defines(part))
         self._bind(shader, part)
-        shader.uniform_sampler("patches", chosen)
         shader.uniform_sampler("patch_points", points)
         shader.image("sums", sums)
-        for name, value in (
-            ("first_entry", first_entry),
-            ("patch_count", count),
-            ("runs", runs),
-            ("first_key", first_key),
-            ("samples", samples),
-            ("seed", self._settings.seed),
-        ):
-            shader.uniform_int(name, (value,))
-        dispatch_linear(shader, count * runs)
-        shader = program("patch_mean_comp")
-        shader.uniform_sampler("patches", chosen)
+        shader.uniform_int("first_key", (first_key,))
+        shader.uniform_int("seed", (self._settings.seed,))
+        _bind_lists(shader, chosen, lists)
+        dispatch_linear(shader, threads)
+        shader = program("patch_mean_comp", SAMPLES_EACH=samples_each)
         shader.uniform_sampler("sums", sums)
         shader.image("direct", target)
-        for name, value in (
-            ("first_entry", first_entry),
-            ("patch_count", count),
-            ("runs", runs),
-            ("samples", samples),
-            ("begins", int(begins)),
-        ):
-            shader.uniform_int(name, (value,))
-        dispatch_linear(shader, count)
+        shader.uniform_int("begins", (int(begins),))
+        _bind_lists(shader, chosen, lists)
+        dispatch_linear(shader, entries)
 
     def _defines(self, part: Part) -> dict:
         return self._scene.light_defines if part == EMITTERS else self._scene.ray_defines
@@ -276,12 +262,32 @@ def reduce_patches(values, first: int, stop: int, results, result: int, others=N
     gpu.compute.dispatch(shader, 1, 1, 1)
 
 
-def add_patches(total: gpu.types.GPUTexture, count: int, added) -> None:
-    """Makes ``total`` the sum of the arrays ``added`` of ``count`` patches, in their order."""
-    for number, texture in enumerate(added):
-        shader = program("patch_add_comp")
-        shader.uniform_sampler("added", texture)
+def add_patches(total: gpu.types.GPUTexture, count: int, terms) -> None:
+    """Makes ``total`` the sum of the arrays ``terms`` of ``count`` patches, in their order."""
+    for first in range(0, len(terms), _MOST_TERMS):
+        some = terms[first : first + _MOST_TERMS]
+        shader = program("patch_add_comp", TERMS=len(some))
+        for number, term in enumerate(some):
+            shader.uniform_sampler(f"term{number}", term)
         shader.image("total", total)
         shader.uniform_int("patch_count", (count,))
-        shader.uniform_int("begins", (int(number == 0),))
+        shader.uniform_int("begins", (int(first == 0),))
         dispatch_linear(shader, count)
+
+
+def _cut(lists: list[_List], start: int, stop: int) -> list[_List]:
+    """Of ``lists``, one after the other, the entries whose first sample is one of ``start`` .. ``stop``."""
+    cut, base = [], 0
+    for first, count, samples in lists:
+        low, high = (min(max(-((base - bound) // samples), 0), count) for bound in (start, stop))
+        cut.append((first + low, high - low, samples))
+        base += count * samples
+    return cut
+
+
+def _bind_lists(shader, chosen, lists: list[_List]) -> None:
+    """``lists`` of ``chosen`` as patch_lists_lib.glsl reads them."""
+    padded = [*lists, *[(0, 0, 1)] * (_MOST_LISTS - len(lists))]
+    shader.uniform_sampler("patches", chosen)
+    for name, values in zip(("list_first", "list_count", "list_samples"), zip(*padded)):
+        shader.uniform_int(name, values)

@@ -47,12 +47,16 @@ class PatchLight:
         self._scene, self._settings = scene, settings
         self.world_texels = world_texels
         self._direct = PatchDirect(scene, settings, pace)
-        self._change = gpu.types.GPUTexture((1, 1), format="RGBA32F")
-        self._brightest: float | None = None  # of the light that bounces begin with, where it is known
+        self._change = scratch(2, "sums")
+        self._brightest: gpu.types.GPUTexture | None = None  # of the light that bounces begin with, where it is known
 
     @property
     def count(self) -> int:
         return self.patches.count
+
+    def release_scratch(self) -> None:
+        """Lets go of what only changes of light need."""
+        self._direct.scratch.release()
 
     # Light
     # ------------------------------------------------------------------------------------------------------------------
@@ -217,28 +221,20 @@ class PatchLight:
         return self._compare(*self._irradiance[:3])
 
     def _compare(self, new, old, older) -> tuple[float, float, float, float]:
-        scale = self._scale()
+        if self._brightest is None:
+            self._brightest = scratch(1, "patches", "R32F")
+            reduce_patches(self.direct, 0, self.count, self._brightest, 0, others=self._brought.texture)
         shader = program("patch_change_comp")
         for name, texture in (("irradiance_new", new), ("irradiance_old", old), ("irradiance_older", older)):
             shader.uniform_sampler(name, texture)
         shader.uniform_sampler("patch_seen", self.patches.seen)
+        shader.uniform_sampler("brightest", self._brightest)
         shader.uniform_float("unseen", _UNSEEN)
         shader.image("change", self._change)
         shader.uniform_int("patch_count", (self.count,))
-        shader.uniform_float("scale", scale)
         gpu.compute.dispatch(shader, 1, 1, 1)
-        energy, change, overlap, luminance = read(self._change, 1)[0].tolist()
+        (energy, change, overlap, luminance), (scale, *_) = read(self._change, 2).tolist()
         return energy, change, overlap, luminance / scale
-
-    def _scale(self) -> float:
-        """What light is taken times before it is squared, so that neither dim nor bright light leaves the range of
-        floats."""
-        if self._brightest is None:
-            result = scratch(1, "patches", "R32F")
-            reduce_patches(self.direct, 0, self.count, result, 0, others=self._brought.texture)
-            self._brightest = float(read(result, 1, channels=1)[0, 0])
-        # light that is not finite is found by its sums
-        return 1.0 / self._brightest if 0.0 < self._brightest < 1e37 else 1.0
 
     def _bounce(
         self, direct, brought, reflected, ends, rays_each: int, count: int, target, bounce: bool = True
@@ -288,7 +284,7 @@ class PatchLight:
         direct, result = allocate(count, "texels"), allocate(count, "texels")
         reflects = np.flatnonzero(read(hits, count)[:, 3] >= 0)
         chosen = numbers(reflects, "texels")
-        run(self._direct.light(hits, 1, chosen, len(reflects), settings.samples, direct, first_key))
+        run(self._direct.light(hits, 1, chosen, [(0, len(reflects), settings.samples)], direct, first_key))
         reflected, brought = scratch(count * rays_each, "rays"), scratch(count, "texels")
         rays = self._trace(hits, 1, 0, count, rays_each, reflected, brought, settings.gather, first_key)
         ends = self.patches.bind_ends(rays.hits, rays.count, MOST_ROUNDS - 1)

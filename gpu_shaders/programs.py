@@ -34,11 +34,15 @@ def program(name: str, **defines) -> gpu.types.GPUShader:
     Raises:
         NoGpuError: the driver does not compile it.
     """
-    chosen = tuple(sorted((key, value) for key, value in defines.items() if value is not None and value is not False))
-    key = (name, chosen)
+    key = _key(name, *defines.items())
     if key not in _programs:
-        _programs[key] = _compile(name, dict(chosen))
+        _programs[key] = _compile(name, dict(key[1]))
     return _programs[key] if observer is None else observer(name, _programs[key])
+
+
+@cache
+def _key(name: str, *defines: tuple[str, Any]) -> tuple[str, tuple]:
+    return name, tuple(sorted((key, value) for key, value in defines if value is not None and value is not False))
 
 
 def compiled() -> int:

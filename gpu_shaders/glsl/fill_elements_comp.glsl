@@ -1,4 +1,4 @@
-/* Sets elements first .. first + count of a linear array to `value`.
+/* Sets elements first .. first + count of a linear array to `value`, with TIMES taken times element `factor` of `factors`.
  *
  * Dispatch: one thread an element; groups of 64.
  */
@@ -7,6 +7,10 @@ void main()
 {
   int index = LINEAR_THREAD;
   if (index < count) {
+#ifdef TIMES
+    imageStore(target, element_position(first + index), vec4(value * element(factors, factor).x));
+#else
     imageStore(target, element_position(first + index), vec4(value));
+#endif
   }
 }

@@ -1,16 +1,18 @@
 /* How far iterations are apart: sums over the patches that probes see, of the last three irradiances.
  *
- * Dispatch: one group of 256 threads; fixed order of summation. Writes one texel: |new|², |new − old|²,
- * (new − old)·(old − older), luminance; of irradiance times `scale`, so that squares of 1e-30 and of 1e30 both fit.
+ * Dispatch: one group of THREADS; fixed order of summation. Writes two texels: |new|², |new − old|², (new − old)·(old − older),
+ * luminance, all of irradiance times a scale, so that squares of 1e-30 and of 1e30 both fit; and that scale.
  */
 
-SHARED_ vec4 partial_sums[256];
+SHARED_ vec4 partial_sums[THREADS];
 
 void main()
 {
   int lane = int(gl_LocalInvocationID.x);
+  float unit = element(brightest, 0).x;
+  float scale = unit > 1.0e-37 && unit < 1.0e37 ? 1.0 / unit : 1.0; /* light that is not finite is found by its sums */
   vec4 sum = vec4(0.0);
-  for (int i = lane; i < patch_count; i += 256) {
+  for (int i = lane; i < patch_count; i += THREADS) {
     vec3 fresh = element(irradiance_new, i).rgb * scale;
     vec3 old = element(irradiance_old, i).rgb * scale;
     vec3 change = fresh - old;
@@ -20,7 +22,7 @@ void main()
   }
   partial_sums[lane] = sum;
   barrier();
-  for (int half_count = 128; half_count > 0; half_count /= 2) {
+  for (int half_count = THREADS / 2; half_count > 0; half_count /= 2) {
     if (lane < half_count) {
       partial_sums[lane] += partial_sums[lane + half_count];
     }
@@ -28,5 +30,6 @@ void main()
   }
   if (lane == 0) {
     imageStore(change, ivec2(0), partial_sums[0]);
+    imageStore(change, ivec2(1, 0), vec4(scale));
   }
 }

@@ -1,6 +1,6 @@
 /* Direct light of patches: irradiance of lamps and sampled emitters at `samples` places spread over the patch's points.
  *
- * Dispatch: RUNS threads an entry of `patches` from first_entry on, each takes SAMPLES_EACH of the samples; groups of 64. patch_mean_comp puts them together.
+ * Dispatch: a thread for SAMPLES_EACH of the samples of a patch, see patch_lists_lib; groups of 64. patch_mean_comp puts them together.
  * (A thread for all samples of a patch would be simpler, but software drivers end every loop of a thread that has gone round 65 535 times.)
  * Fewer samples than points take one of each equal run of points, all the same one of their runs, which is random.
  * The key of a number is (first_key + patch, light, seed); its index counts samples, so the points of a patch share one stratified sequence.
@@ -9,13 +9,17 @@
 
 void main()
 {
-  int thread_number = LINEAR_THREAD;
-  int entry = thread_number / runs;
-  if (entry >= patch_count) {
+  /* Groups come from both ends in turn: software drivers give each core one run of them, and the lists differ in work. */
+  int group = LINEAR_THREAD / 64;
+  int from_end = int(gl_NumWorkGroups.x * gl_NumWorkGroups.y) - 1 - group / 2;
+  int thread_number = 64 * (group % 2 == 0 ? group / 2 : from_end) + int(gl_LocalInvocationID.x);
+  Entry entry = entry_of_run(thread_number);
+  if (entry.list == LISTS) {
     return;
   }
-  int first = (thread_number - entry * runs) * SAMPLES_EACH;
-  int patch_index = int(element(patches, first_entry + entry).x);
+  int samples = list_samples[entry.list];
+  int first = entry.run * SAMPLES_EACH;
+  int patch_index = patch_of(entry);
   uvec3 key = uvec3(uint(first_key + patch_index), 0u, uint(seed));
   int shift = int(pcg3d(key + uvec3(0u, 0x85EBCA6Bu, 0u)).x % uint(POINTS));
   vec3 irradiance = vec3(0.0);

@@ -1,16 +1,16 @@
 /* One number for a range of patches: the sum of the first channel of `values`, or with LARGEST the largest of its colours after adding
  * those of `others`.
  *
- * Dispatch: one group of 256 threads; fixed order of summation. Writes element `result` of `results`.
+ * Dispatch: one group of THREADS; fixed order of summation. Writes element `result` of `results`.
  */
 
-SHARED_ float partial[256];
+SHARED_ float partial[THREADS];
 
 void main()
 {
   int lane = int(gl_LocalInvocationID.x);
   float reduced = 0.0;
-  for (int i = first + lane; i < stop; i += 256) {
+  for (int i = first + lane; i < stop; i += THREADS) {
 #ifdef LARGEST
     vec3 color = abs(element(values, i).rgb + element(others, i).rgb);
     float value = max(color.r, max(color.g, color.b));
@@ -21,7 +21,7 @@ void main()
   }
   partial[lane] = reduced;
   barrier();
-  for (int half_count = 128; half_count > 0; half_count /= 2) {
+  for (int half_count = THREADS / 2; half_count > 0; half_count /= 2) {
     if (lane < half_count) {
 #ifdef LARGEST
       float value = partial[lane + half_count];

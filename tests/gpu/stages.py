@@ -108,7 +108,7 @@ class Stages:
         count = self.gpu.count * 6 * self.settings.face**2
         direct = allocate(count, "test")
         lit = np.flatnonzero(self.hits()[:, 3] >= 0)
-        steps.run(self.light._direct.light(hits, 1, numbers(lit, "test"), len(lit), samples, direct))
+        steps.run(self.light._direct.light(hits, 1, numbers(lit, "test"), [(0, len(lit), samples)], direct))
         return read(direct, count)[:, :3].reshape(self.gpu.count, -1, 3)
 
     # Patches
@@ -147,7 +147,8 @@ class Stages:
         """(C, 3) direct light of ``patches`` (C,) by so many samples."""
         direct = allocate(self.light.count, "test")
         chosen = numbers(patches, "test")
-        steps.run(self.light._direct.light(self.light.patches.points, POINTS, chosen, len(patches), samples, direct))
+        lists = [(0, len(patches), samples)]
+        steps.run(self.light._direct.light(self.light.patches.points, POINTS, chosen, lists, direct))
         return read(direct, self.light.count)[patches, :3].astype(float)
 
     def direct(self):
