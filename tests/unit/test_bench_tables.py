@@ -109,6 +109,7 @@ def test_frame_tells_bandwidth_only_where_it_is_not_lost_in_waiting():
                 "longest": 7e-3,
                 "count": 3,
                 "phases": {"field": 1e-3},
+                "watched_seconds": 5e-3,
                 "patches": 99,
                 "iterations": 8,
             },
