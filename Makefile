@@ -8,7 +8,7 @@ ARGUMENTS ?=
 .PHONY: test unit gpu gui demo nightly bench zip lint
 
 test:
-	@./scripts/test --quick $(SERIES) -- tests $(ARGUMENTS)
+	@./scripts/test --quick --beside tests/gui $(SERIES) -- tests $(ARGUMENTS)
 
 unit:
 	@./scripts/test --quick $(SERIES) -- tests/unit $(ARGUMENTS)

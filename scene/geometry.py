@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from math import prod
 
 import bpy
 import numpy as np
@@ -44,33 +45,85 @@ class WorldTriangles:
     corner_uvs: np.ndarray  # (I·T, 3, 2) float32
 
 
-def read_mesh(mesh: bpy.types.Mesh, attributes: Iterable[str] = ()) -> MeshArrays:
-    """Read an evaluated mesh. Triangles without area and those with a corner that is not finite are dropped and
-    counted.
+@dataclass
+class MeshCopy:
+    """A mesh as Blender has it, copied while its depsgraph lives. V vertices, C corners, F faces, T triangles."""
+
+    vertices: np.ndarray  # (V, 3) float32
+    corner_vertices: np.ndarray  # (C,) int32
+    corners: np.ndarray | None  # (T, 3) int32 corners of triangles; None where every face is one
+    faces: np.ndarray | None  # (T,) int32, as ``corners``
+    normals_domain: str  # "POINT", "CORNER" or "FACE": what ``normals`` are of
+    normals: np.ndarray  # (N, 3) float32
+    slots: np.ndarray | None  # (F,) int32 material slot; None while every face uses the first
+    uv_maps: dict[str, np.ndarray]  # name -> (C, 2) float32
+    active_uv_map: str
+    attributes: dict[str, tuple[str, np.ndarray]]  # name -> domain, (N, 1 to 4)
+    texture_location: np.ndarray
+    texture_size: np.ndarray
+
+
+def copy_mesh(mesh: bpy.types.Mesh, attributes: Iterable[str] = ()) -> MeshCopy:
+    """What is needed of an evaluated mesh: bulk reads and nothing else, for Blender waits meanwhile.
 
     ``attributes`` names those that its materials ask for, "" the colours that renders show.
     """
-    vertices = (
-        _read(mesh.attributes["position"].data, "vector", (len(mesh.vertices), 3), np.float32)
-        if mesh.vertices
-        else np.empty((0, 3), np.float32)
-    )
-    corner_vertices = (
-        _read(mesh.attributes[".corner_vert"].data, "value", (len(mesh.loops),), np.int32)
-        if mesh.loops
-        else np.empty(0, np.int32)
-    )
-    corners, faces = _triangulation(mesh)
-    arrays = MeshArrays(
-        vertices=vertices.astype(float),
-        triangles=corner_vertices[corners],
-        corner_normals=_corner_normals(mesh, corner_vertices, corners, faces),
-        slots=_material_slots(mesh, faces),
-        uv_maps={layer.name: _uv_map(mesh, layer.name)[corners] for layer in mesh.uv_layers},
+    corners = faces = None
+    if len(mesh.loops) != 3 * len(mesh.polygons):  # else they are triangles already
+        mesh.calc_loop_triangles()
+        count = len(mesh.loop_triangles)
+        corners = _read(mesh.loop_triangles, "loops", (count, 3), np.int32)
+        faces = _read(mesh.loop_triangle_polygons, "value", (count,), np.int32)
+    return MeshCopy(
+        vertices=(
+            _read(mesh.attributes["position"].data, "vector", (len(mesh.vertices), 3), np.float32)
+            if mesh.vertices
+            else np.empty((0, 3), np.float32)
+        ),
+        corner_vertices=(
+            _read(mesh.attributes[".corner_vert"].data, "value", (len(mesh.loops),), np.int32)
+            if mesh.loops
+            else np.empty(0, np.int32)
+        ),
+        corners=corners,
+        faces=faces,
+        normals_domain=mesh.normals_domain,
+        normals=_normals(mesh),
+        slots=_face_slots(mesh),
+        uv_maps={
+            layer.name: _read(mesh.attributes[layer.name].data, "vector", (len(mesh.loops), 2), np.float32)
+            for layer in mesh.uv_layers
+        },
         active_uv_map=next((layer.name for layer in mesh.uv_layers if layer.active_render), ""),
-        attributes=_attributes(mesh, attributes, corner_vertices, corners, faces),
+        attributes=_attributes(mesh, attributes),
         texture_location=np.array(mesh.texspace_location, float),
         texture_size=np.array(mesh.texspace_size, float),
+    )
+
+
+def triangulated(copy: MeshCopy) -> MeshArrays:
+    """The triangles of a mesh. Those without area and those with a corner that is not finite are dropped and
+    counted."""
+    corners, faces = copy.corners, copy.faces
+    if corners is None or faces is None:
+        count = len(copy.corner_vertices) // 3
+        corners, faces = np.arange(3 * count, dtype=np.int32).reshape(-1, 3), np.arange(count, dtype=np.int32)
+    triangles = copy.corner_vertices[corners]
+    elements = {"POINT": triangles, "CORNER": corners, "FACE": np.broadcast_to(faces[:, None], corners.shape)}
+    arrays = MeshArrays(
+        vertices=copy.vertices.astype(float),
+        triangles=triangles,
+        corner_normals=copy.normals[elements[copy.normals_domain]],
+        slots=np.zeros(len(faces), np.int32) if copy.slots is None else copy.slots[faces],
+        uv_maps={name: _finite(uvs)[corners] for name, uvs in copy.uv_maps.items()},
+        active_uv_map=copy.active_uv_map,
+        attributes={
+            name: _finite(values.astype(np.float32))[elements[domain]]
+            for name, (domain, values) in copy.attributes.items()
+            if domain in elements
+        },
+        texture_location=copy.texture_location,
+        texture_size=copy.texture_size,
     )
     _drop_unusable(arrays)
     return arrays
@@ -108,47 +161,31 @@ def place(mesh: MeshArrays, corner_uvs: np.ndarray, matrices: np.ndarray) -> Wor
 
 
 def _read(collection, attribute: str, shape: tuple[int, ...], dtype) -> np.ndarray:
-    values = np.empty(int(np.prod(shape)), dtype)
+    values = np.empty(prod(shape), dtype)
     collection.foreach_get(attribute, values)
     return values.reshape(shape)
 
 
-def _triangulation(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """((T, 3) int32 corners, (T,) int32 faces) of all triangles."""
-    face_count = len(mesh.polygons)
-    if len(mesh.loops) == 3 * face_count:  # triangles already, so there is nothing to ask Blender for
-        return np.arange(3 * face_count, dtype=np.int32).reshape(-1, 3), np.arange(face_count, dtype=np.int32)
-    mesh.calc_loop_triangles()
-    count = len(mesh.loop_triangles)
-    corners = _read(mesh.loop_triangles, "loops", (count, 3), np.int32)
-    faces = _read(mesh.loop_triangle_polygons, "value", (count,), np.int32)
-    return corners, faces
-
-
-def _corner_normals(mesh: bpy.types.Mesh, corner_vertices, corners, faces) -> np.ndarray:
-    """(T, 3, 3) float32, read in the cheapest domain that holds them all."""
-    if not len(corners):
-        return np.empty((0, 3, 3), np.float32)
+def _normals(mesh: bpy.types.Mesh) -> np.ndarray:
+    """(N, 3) float32, in the cheapest domain that holds them all."""
+    if not mesh.loops:
+        return np.empty((0, 3), np.float32)
     if mesh.normals_domain == "POINT":
-        normals = _read(mesh.vertex_normals, "vector", (len(mesh.vertices), 3), np.float32)
-        return normals[corner_vertices[corners]]
+        return _read(mesh.vertex_normals, "vector", (len(mesh.vertices), 3), np.float32)
     if mesh.normals_domain == "FACE":
-        normals = _read(mesh.polygon_normals, "vector", (len(mesh.polygons), 3), np.float32)
-        return np.repeat(normals[faces][:, None], 3, axis=1)
-    return _read(mesh.corner_normals, "vector", (len(mesh.loops), 3), np.float32)[corners]
+        return _read(mesh.polygon_normals, "vector", (len(mesh.polygons), 3), np.float32)
+    return _read(mesh.corner_normals, "vector", (len(mesh.loops), 3), np.float32)
 
 
-def _material_slots(mesh: bpy.types.Mesh, faces: np.ndarray) -> np.ndarray:
-    # Absent while every face uses the first slot.
+def _face_slots(mesh: bpy.types.Mesh) -> np.ndarray | None:
     attribute: bpy.types.Attribute | None = mesh.attributes.get("material_index")
     if attribute is None or attribute.domain != "FACE" or attribute.data_type != "INT":
-        return np.zeros(len(faces), np.int32)
-    return _read(attribute.data, "value", (len(mesh.polygons),), np.int32)[faces]
+        return None
+    return _read(attribute.data, "value", (len(mesh.polygons),), np.int32)
 
 
-def _uv_map(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
-    uvs = _read(mesh.attributes[name].data, "vector", (len(mesh.loops), 2), np.float32)
-    return np.nan_to_num(uvs, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
+def _finite(values: np.ndarray) -> np.ndarray:
+    return np.nan_to_num(values, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
 
 
 # How the values of an attribute are read: property of its elements and channels.
@@ -164,26 +201,19 @@ _VALUES = {
 }
 
 
-def _attributes(mesh, names: Iterable[str], corner_vertices, corners, faces) -> dict[str, np.ndarray]:
-    """(T, 3, channels) float32 of those of ``names`` that ``mesh`` has, linear where they are colours."""
-    found = {}
+def _attributes(mesh: bpy.types.Mesh, names: Iterable[str]) -> dict[str, tuple[str, np.ndarray]]:
+    """Those of ``names`` that ``mesh`` has, linear where they are colours: name -> domain, (N, channels)."""
+    found: dict[str, tuple[str, np.ndarray]] = {}
     for name in names:
         index = mesh.color_attributes.render_color_index
-        layer = mesh.attributes.get(name) if name else None
+        layer: bpy.types.Attribute | None = mesh.attributes.get(name) if name else None
         if not name and 0 <= index < len(mesh.color_attributes):
             layer = mesh.color_attributes[index]
         if layer is None or layer.data_type not in _VALUES:
             continue
         attribute, channels = _VALUES[layer.data_type]
         kind = {"INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}.get(layer.data_type, np.float32)
-        values = _read(layer.data, attribute, (len(layer.data), channels), kind).astype(np.float32)
-        values = np.nan_to_num(values, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
-        if layer.domain == "POINT":
-            found[name] = values[corner_vertices[corners]]
-        elif layer.domain == "CORNER":
-            found[name] = values[corners]
-        elif layer.domain == "FACE":
-            found[name] = np.repeat(values[faces][:, None], 3, axis=1)
+        found[name] = layer.domain, _read(layer.data, attribute, (len(layer.data), channels), kind)
     return found
 
 

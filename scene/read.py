@@ -13,7 +13,7 @@ from ..core.snapshot import Light, SceneSnapshot, World
 from ..core.steps import Steps, run
 from .camera import read_camera
 from .evaluation import as_in_viewport, at_render_quality, rendered_objects
-from .geometry import MeshArrays, WorldTriangles, place, read_mesh
+from .geometry import MeshArrays, MeshCopy, WorldTriangles, copy_mesh, place, triangulated
 from .images import ImageTable
 from .instance_facts import InstanceFacts, facts_of
 from .lights import INTENSITY_PROPERTY, LightTable
@@ -40,7 +40,8 @@ _MOST_ALONE = 64  # instances of meshes whose materials tell them apart; the res
 class _Instances:
     """All instances of one mesh with one set of materials."""
 
-    mesh: MeshArrays
+    mesh_key: tuple
+    mesh: MeshArrays = field(init=False)  # as soon as the mesh's copy is triangulated
     materials: list[bpy.types.Material | None]  # per slot, original datablocks
     intensity: float  # factor on emission
     facts: InstanceFacts  # of the first one
@@ -53,7 +54,7 @@ class _Harvest:
     """What has to be taken out of the depsgraph while it lives."""
 
     groups: dict[tuple, _Instances] = field(default_factory=dict)
-    meshes: dict[tuple, MeshArrays] = field(default_factory=dict)
+    meshes: dict[tuple, tuple[MeshCopy, str]] = field(default_factory=dict)  # and the name of the first with it
     wants: dict[int, Wants] = field(default_factory=dict)  # by material
     alone: int = 0  # instances so far of meshes whose materials tell them apart
     lights: list[tuple[bpy.types.Object, np.ndarray, str]] = field(default_factory=list)
@@ -93,7 +94,7 @@ def read_in_steps(
     scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer | None = None, *, live: bool = False
 ) -> Steps[SceneSnapshot]:
     """``read_scene`` in steps: in the first one Blender evaluates the scene and its arrays are copied, in the others
-    follow materials, mesh by mesh.
+    follow triangles and materials, mesh by mesh.
 
     Raises:
         InputError: something of it was deleted between two steps.
@@ -144,12 +145,17 @@ def _read(scene, view_layer, evaluate, world: World | None = None) -> Steps[Scen
         "name": scene.name,
     }
     yield
+    meshes = {}
+    for key, (copy, name) in harvest.meshes.items():
+        meshes[key] = _triangulated(copy, name, notices)
+        yield
     images = ImageTable(notices)
     surfaces = SurfaceParts()
     # Inside a render engine's callback Cycles cannot be asked, and so no atlas be filled.
     materials = MaterialTable(images, notices, surfaces if world is None else None)
     override = view_layer.material_override
     for group in harvest.groups.values():
+        group.mesh = meshes[group.mesh_key]
         group.materials = [override] if override else group.materials or [None]
         surfaces.add(group, group.materials)
     parts = []
@@ -206,7 +212,7 @@ def _harvest(
         elif item.type == "LIGHT":
             harvest.lights.append((item.original, matrix, name))
         elif _receives_diffuse_rays(item, notices):
-            _add_mesh(harvest, item, instance, matrix, name, notices)
+            _add_mesh(harvest, item, instance, matrix, name)
     return harvest
 
 
@@ -224,21 +230,14 @@ def _receives_diffuse_rays(item: bpy.types.Object, notices: Notices) -> bool:
     return True
 
 
-def _add_mesh(harvest: _Harvest, item, instance, matrix: np.ndarray, name: str, notices: Notices) -> None:
+def _add_mesh(harvest: _Harvest, item, instance, matrix: np.ndarray, name: str) -> None:
     mesh = item.data
     slots = _slot_materials(item, mesh)
     asked = [_wants(harvest, material) for material in slots]
     attributes = frozenset().union(*(one.attributes for one in asked))
     key = (mesh.as_pointer(), attributes)
     if key not in harvest.meshes:
-        arrays = harvest.meshes[key] = read_mesh(mesh, sorted(attributes))
-        if arrays.not_finite:
-            notices.append(
-                f"object '{name}': {arrays.not_finite} triangles have corners that are not finite and are left out; "
-                "clean the mesh up"
-            )
-        if arrays.needles:
-            notices.group("triangles without area are left out", f"{name} ({arrays.needles})")
+        harvest.meshes[key] = copy_mesh(mesh, sorted(attributes)), name
     intensity = float(item.get(INTENSITY_PROPERTY, 1.0))
     alone = -1
     if any(one.instance for one in asked):
@@ -247,7 +246,7 @@ def _add_mesh(harvest: _Harvest, item, instance, matrix: np.ndarray, name: str, 
     group = harvest.groups.get(group_key)
     if group is None:
         facts = facts_of(item, instance, frozenset().union(*(one.properties for one in asked)))
-        group = harvest.groups[group_key] = _Instances(harvest.meshes[key], slots, intensity, facts)
+        group = harvest.groups[group_key] = _Instances(key, slots, intensity, facts)
     group.matrices.append(matrix)
     group.names.append(name)
 
@@ -267,6 +266,18 @@ def _slot_materials(item: bpy.types.Object, mesh: bpy.types.Mesh) -> list[bpy.ty
             materials += [None] * (index + 1 - len(materials))
             materials[index] = slot.material
     return [material.original if material else None for material in materials]
+
+
+def _triangulated(copy: MeshCopy, name: str, notices: Notices) -> MeshArrays:
+    arrays = triangulated(copy)
+    if arrays.not_finite:
+        notices.append(
+            f"object '{name}': {arrays.not_finite} triangles have corners that are not finite and are left out; "
+            "clean the mesh up"
+        )
+    if arrays.needles:
+        notices.group("triangles without area are left out", f"{name} ({arrays.needles})")
+    return arrays
 
 
 def _assemble(

@@ -77,7 +77,8 @@ class _Kept:
 class LiveBake:
     """``follow`` tells of a new state of the scene, ``step`` works on it. ``message``: what went wrong last."""
 
-    def __init__(self):
+    def __init__(self, pace: Pace | None = None):
+        """``pace``: how much is done in a step; by default a quarter of a frame's work."""
         self.message = ""
         self.shown_moment = 0.0  # all probes show the scene as it was then, or later
         self._wanted: _Wanted | None = None
@@ -85,7 +86,7 @@ class LiveBake:
         self._kept: dict[str, _Kept] = {}
         self._is_rough = False  # probes have light that no field tells of yet
         self._is_settling = False
-        self._pace = Pace(_STEP_SECONDS, wait_for_gpu)
+        self._pace = pace or Pace(_STEP_SECONDS, wait_for_gpu)
 
     @property
     def is_working(self) -> bool:

@@ -8,9 +8,9 @@ from gridlight.core.conventions import ACTIVE
 from gridlight.core.gradients import per_cell
 from gridlight.core.probe_edits import ProbeEdits
 from gridlight.core.settings import BakeSettings
-from gridlight.core.steps import run
+from gridlight.core.steps import Pace, run
 from gridlight.gpu_shaders.live_field import LiveField
-from gridlight.gpu_shaders.textures import read
+from gridlight.gpu_shaders.textures import read, wait_for_gpu
 from gridlight.gpu_shaders.viewport_field import FieldTextures
 from gridlight.viewport.live_bake import LiveBake, Target
 from small_scenes import Silent, frame
@@ -20,6 +20,7 @@ WHERE = grid((5, 3, 4))
 DARK = np.isin(np.arange(WHERE.count), [7, 8, 22, 37])  # switched off: nodes without light of their own
 EDITS = ProbeEdits(DARK, np.zeros((WHERE.count, 3)))
 ROOMS = rooms()
+ONE_STEP = 0.0  # a budget that is spent by then
 MOVED = with_light(ROOMS, 0, matrix=frame((-0.85, 0.25, 0.2)))
 
 
@@ -116,6 +117,17 @@ def test_only_probes_that_were_relit_are_shown_anew(relit):
     run(session.relight(MOVED))
 
 
+class SixteenAtATime(Pace):
+    """That of a device for which sixteen probes are a step's work, however fast this one is."""
+
+    def _learn(self, kind, number, growth):
+        """Keeps to the first portion."""
+
+
+def live_bake():
+    return LiveBake(SixteenAtATime(0.004, wait_for_gpu))
+
+
 class Views:
     """What a preview does with live light, without a window."""
 
@@ -142,7 +154,7 @@ class Views:
 
 def test_live_light_comes_in_slices_without_jumps_and_ends_where_a_bake_does(relit):
     settings = BakeSettings(**SETTINGS)
-    live, views = LiveBake(), Views(relit[1])
+    live, views = live_bake(), Views(relit[1])
     target = [Target(WHERE, EDITS)]
     live.follow(ROOMS, target, settings, 0.0)
     while live.is_working:
@@ -152,11 +164,11 @@ def test_live_light_comes_in_slices_without_jumps_and_ends_where_a_bake_does(rel
     live.follow(MOVED, target, settings, 1.0)
     frames = [before]
     while live.is_working:
-        views.frame(live, 0.001)
+        views.frame(live, ONE_STEP)
         frames.append(shown_values(views.shown)[0])
     assert live.shown_moment == 1.0 and len(views.slices) > 2, views.slices
     for _ in range(25):
-        views.frame(live, 0.001)
+        views.frame(live, ONE_STEP)
         frames.append(shown_values(views.shown)[0])
     expected = relit[2]  # a relight is a fresh bake: test_relight.py
     active = expected.state == ACTIVE
@@ -175,7 +187,7 @@ def test_live_light_comes_in_slices_without_jumps_and_ends_where_a_bake_does(rel
 
 def test_lamps_that_never_rest_leave_no_probe_behind(relit):
     settings = BakeSettings(**SETTINGS)
-    live, views = LiveBake(), Views(relit[1])
+    live, views = live_bake(), Views(relit[1])
     target = [Target(WHERE, EDITS)]
     live.follow(ROOMS, target, settings, 0.0)
     while live.is_working:
@@ -184,7 +196,7 @@ def test_lamps_that_never_rest_leave_no_probe_behind(relit):
     for moment in range(1, 400):
         place = (-1.1 + 0.1 * np.sin(0.1 * moment), 0.4, 0.2)
         live.follow(with_light(ROOMS, 0, matrix=frame(place)), target, settings, float(moment))
-        views.frame(live, 0.02)
+        views.frame(live, ONE_STEP)
         if live.shown_moment != seen[-1]:
             seen.append(live.shown_moment)
         if len(seen) > 3:
