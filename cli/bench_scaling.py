@@ -71,7 +71,7 @@ def crossover(rasterised: list[dict], traced: list[dict]) -> float | None:
     did."""
     by_size = {row["size"]: row for row in traced}
     pairs = [(row, by_size[row["size"]]) for row in rasterised if row["size"] in by_size]
-    lead = [np.log(raster["phases"]["capture"] / trace["phases"]["capture"]) for raster, trace in pairs]
+    lead = [np.log(raster["capture_again"] / trace["capture_again"]) for raster, trace in pairs]
     for index in range(1, len(pairs)):
         if lead[index - 1] <= 0 < lead[index]:
             share = lead[index - 1] / (lead[index - 1] - lead[index])
@@ -80,21 +80,24 @@ def crossover(rasterised: list[dict], traced: list[dict]) -> float | None:
     return None
 
 
+_PER_SCENE = ("read", "hierarchy, upload", "culling, placement", "capture")  # with the first capture the scene is sent
+
+
 def growth(rows: list[dict]) -> dict[str, float] | None:
-    """By how much rays and all light of a bake grow per probe from 10 000 triangles to the most; None where the range
-    was not measured. Reading the scene and building the hierarchy, which no probe adds to, are left out."""
+    """By how much what a probe adds to a bake grows from 10 000 triangles to the most: its capture when the scene is
+    there, and that with its patches, their light and its field. None where the range was not measured."""
     middle = [row for row in rows if row["size"] == BASE["triangles"]]
     if not middle or rows[-1]["size"] <= BASE["triangles"]:
         return None
     first, last = middle[0], rows[-1]
 
     def per_probe(row: dict) -> float:
-        phases = row["phases"]
-        return (row["seconds"] - phases["read"] - phases.get("hierarchy, upload", 0.0)) / row["probes"]
+        others = sum(seconds for name, seconds in row["phases"].items() if name not in _PER_SCENE)
+        return (row["capture_again"] + others) / row["probes"]
 
     return {
         "to": last["triangles"],
-        "capture": last["phases"]["capture"] / first["phases"]["capture"],
+        "capture": last["capture_again"] / first["capture_again"],
         "bake": per_probe(last) / per_probe(first),
     }
 
@@ -151,7 +154,7 @@ def _sweep_table(sweep: dict) -> list[str]:
     lines = [f"{sweep['name']} ({sweep['capture']})"]
     if rows:
         names = phases_of(rows)
-        cells = [[sweep["parameter"], "patches", *names, "whole", "µs/probe", "capture predicted"]]
+        cells = [[sweep["parameter"], "patches", *names, "whole", "µs/probe", "capture again", "predicted"]]
         for row in rows:
             size = {"probes": row["probes"], "triangles": row["triangles"], "face": row["face"]}[sweep["parameter"]]
             seconds = [row["phases"].get(name, 0.0) for name in names]
@@ -161,6 +164,7 @@ def _sweep_table(sweep: dict) -> list[str]:
                     str(row["patches"]),
                     *[bench_table.significant(value) for value in [*seconds, row["seconds"]]],
                     bench_table.significant(1e6 * row["seconds"] / row["probes"]),
+                    bench_table.significant(row["capture_again"]),
                     bench_table.significant(row["predicted_capture"]),
                 ]
             )
@@ -173,8 +177,8 @@ def _sweep_table(sweep: dict) -> list[str]:
     grown = growth(rows) if sweep["parameter"] == "triangles" else None
     if grown:
         lines.append(
-            f"from {BASE['triangles']} to {grown['to']} triangles a probe's capture grows {grown['capture']:.2f} "
-            f"times, its part of the bake without reading and hierarchy {grown['bake']:.2f} times"
+            f"from {BASE['triangles']} to {grown['to']} triangles a probe's capture, the scene being there, grows {grown['capture']:.2f} "
+            f"times, with its patches, their light and its field {grown['bake']:.2f} times"
         )
     if sweep["left_out"]:
         item = sweep["left_out"]
@@ -193,7 +197,7 @@ def plot(summary: dict) -> str:
                 continue
             sizes = [row[parameter] for row in sweep["rows"]]
             chart.line(f"{sweep['capture']}, whole", sizes, [row["seconds"] for row in sweep["rows"]])
-            captured = [row["phases"].get("capture", 0.0) for row in sweep["rows"]]
+            captured = [row["capture_again"] for row in sweep["rows"]]
             chart.line(f"{sweep['capture']}, capture", sizes, captured, dashed=True)
         panels.append(chart)
     return bench_chart.page("Cost of a bake over its size", summary, panels)

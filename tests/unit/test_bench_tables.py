@@ -21,7 +21,7 @@ def test_exponents_of_powers_are_found():
 
 def test_the_crossover_lies_where_both_captures_take_the_same_time():
     def rows(seconds_of):
-        return [{"size": n, "triangles": n, "phases": {"capture": seconds_of(n)}} for n in (1000, 10_000, 100_000)]
+        return [{"size": n, "triangles": n, "capture_again": seconds_of(n)} for n in (1000, 10_000, 100_000)]
 
     rasterised, traced = rows(lambda n: 1e-6 * n), rows(lambda n: 2e-2)
     assert bench_scaling.crossover(rasterised, traced) == pytest.approx(20_000)
@@ -31,8 +31,8 @@ def test_the_crossover_lies_where_both_captures_take_the_same_time():
 
 def test_growth_is_told_from_ten_thousand_triangles_on():
     def hall(size, capture, light):
-        phases = {"read": 1.0, "capture": capture, "light": light}
-        return {"size": size, "triangles": size, "probes": 10, "seconds": sum(phases.values()), "phases": phases}
+        phases = {"read": 1.0, "capture": 100.0 * size, "light of patches": light}
+        return {"size": size, "triangles": size, "probes": 10, "capture_again": capture, "phases": phases}
 
     rows = [hall(1000, 1.0, 1.0), hall(10_000, 2.0, 2.0), hall(1_000_000, 3.0, 4.0)]
     assert bench_scaling.growth(rows) == pytest.approx({"to": 1_000_000, "capture": 1.5, "bake": 7 / 4})
@@ -171,6 +171,7 @@ def test_scaling_names_what_was_left_out():
         "patches": 5,
         "resident": False,
         "predicted_capture": 0.5,
+        "capture_again": 0.4,
         "phases": {"read": 1.0, "capture": 2.0},
     }
     left_out = {"sweep": "triangles", "from": 3000, "expected_seconds": 77.0}
