@@ -36,8 +36,9 @@ def send_images(images: list[Image]) -> tuple[gpu.types.GPUTexture, gpu.types.GP
 def _send(image: Image, halves: gpu.types.GPUTexture, first: int, count: int) -> None:
     """``image`` and its mip levels to ``count`` elements of ``halves`` from ``first`` on."""
     height, width = image.pixels.shape[:2]
-    padded = np.zeros((count, 4), np.float32)
+    padded = np.empty((count, 4), np.float32)
     padded[: width * height] = np.asarray(image.pixels, np.float32).reshape(-1, 4)
+    padded[width * height :] = 0.0
     texels = upload(padded, "image texels")
     levels, start = _levels(width, height), 0
     for before, level in zip(levels, levels[1:]):

@@ -17,11 +17,13 @@ def upload(data: np.ndarray, what: str, pixel: str = "RGBA32F") -> gpu.types.GPU
     Raises:
         InputError: more elements than one texture holds; ``what`` names them in the message.
     """
-    flat = np.asarray(data, np.float32).reshape(-1, 4)
+    flat = np.ascontiguousarray(data, np.float32).reshape(-1, 4)
     rows = _rows(len(flat), what)
-    padded = np.zeros((rows * ROW, 4), np.float32)
-    padded[: len(flat)] = flat
-    buffer = gpu.types.Buffer("FLOAT", padded.size, padded.reshape(-1))
+    if len(flat) < rows * ROW:
+        padded = np.empty((rows * ROW, 4), np.float32)
+        padded[: len(flat)], padded[len(flat) :] = flat, 0.0
+        flat = padded
+    buffer = gpu.types.Buffer("FLOAT", flat.size, flat.reshape(-1))
     return gpu.types.GPUTexture((ROW, rows), format=pixel, data=buffer)
 
 

@@ -95,7 +95,9 @@ class ImageTable:
         if covers:
             alpha = pixels[..., 3:]
             np.divide(pixels[..., :3], alpha, out=pixels[..., :3], where=alpha > 0)
-        return pixels if np.isfinite(pixels).all() else np.nan_to_num(pixels, nan=0.0, posinf=0.0, neginf=0.0)
+        if table is not None or np.isfinite(pixels).all():  # bytes always are
+            return pixels
+        return np.nan_to_num(pixels, nan=0.0, posinf=0.0, neginf=0.0)
 
     def _decoding(self, image: bpy.types.Image) -> np.ndarray | None:
         """Table from byte to linear value, or None where Blender hands out linear values already."""
