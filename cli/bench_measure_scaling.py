@@ -10,6 +10,7 @@ import numpy as np
 from ..bake.capture_choice import device_cost
 from ..bake.job import drive
 from ..bake.session import BakeSession
+from ..core import bvh
 from ..core.errors import GridlightError
 from ..core.grid import Grid
 from ..core.settings import BakeSettings
@@ -135,6 +136,7 @@ class _Bakes:
         grid = Grid.from_bounds([_INSET_M] * 3, HALL_SIZE_M - _INSET_M, resolution_for(case["probes"]))
         settings = BakeSettings(**{**self._settings, "face": case["face"], "capture": capture, "keep_all": True})
         clock = PhaseClock()
+        bvh.forget()
         started = time.perf_counter()
         session = BakeSession(self._snapshot, grid, settings, clock, stopwatch=clock)
         drive(session.bake(), self._should_stop)

@@ -56,7 +56,7 @@ class SceneTextures:
         self._origin = np.asarray(origin, float)
         self._textures: dict = {}
         corners = (snapshot.triangle_positions - self._origin).astype(np.float32)
-        self._take_hierarchy(corners, (yield from pace.in_background(bvh.build, corners)))
+        self._take_hierarchy(corners, (yield from pace.in_background(bvh.kept_or_built, corners)))
         yield
         rows = yield from pace.in_background(self._surface_rows, snapshot, density, slice(None))
         for name, values in rows.items():

@@ -85,13 +85,13 @@ class ImageTable:
         rows = min(height, max(1, round(height * min(1.0, MAX_EDGE / max(width, height)))))
         # A channel-packed fourth channel has nothing to do with the other three, and one of ones changes nothing.
         covers = image.alpha_mode != "CHANNEL_PACKED" and encoded.shape[2] == 4 and bool((encoded[..., 3] != 1).any())
-        bands = []
+        pixels = np.empty((height, columns, 4), np.float32)
         for start in range(0, height, _CHUNK_ROWS):
             band = _to_rgba(encoded[start : start + _CHUNK_ROWS], table, image)
             if covers:
                 band[..., :3] *= band[..., 3:]  # filtered premultiplied: holes do not stain their rims
-            bands.append(_box_filter(band, columns, axis=1))
-        pixels = _box_filter(np.concatenate(bands), rows, axis=0)
+            pixels[start : start + _CHUNK_ROWS] = _box_filter(band, columns, axis=1)
+        pixels = _box_filter(pixels, rows, axis=0)
         if covers:
             alpha = pixels[..., 3:]
             np.divide(pixels[..., :3], alpha, out=pixels[..., :3], where=alpha > 0)
@@ -112,28 +112,26 @@ class ImageTable:
 
 
 def _to_rgba(encoded: np.ndarray, table: np.ndarray | None, image: bpy.types.Image) -> np.ndarray:
-    """(rows, width, channels) as Blender stores them to linear straight RGBA."""
-    channels = encoded.shape[2]
-    decoded = encoded if table is None else _decode(encoded, table)
-    rgba = np.empty((*encoded.shape[:2], 4), np.float32)
-    if channels == 4:
-        rgba[:] = decoded
+    """(rows, width, channels) as Blender stores them to linear straight RGBA. ``encoded`` is used up."""
+    channels, has_alpha = encoded.shape[2], encoded.shape[2] == 4 and image.alpha_mode != "NONE"
+    if table is not None:  # bytes, which Blender hands out as shares of 255
+        encoded *= np.float32(255.0)
+        encoded += np.float32(0.5)
+        byte = encoded.astype(np.uint8)
+        decoded = table.take(byte, mode="clip")  # no need to check bounds, and faster than an index
+        alpha = _BYTE_TO_LINEAR.take(byte[..., 3:], mode="clip") if has_alpha else np.float32(1.0)
     else:
+        decoded = encoded
+        alpha = encoded[..., 3:].copy() if has_alpha else np.float32(1.0)
+        if has_alpha and image.alpha_mode != "CHANNEL_PACKED":  # float images are stored premultiplied
+            np.divide(decoded[..., :3], alpha, out=decoded[..., :3], where=alpha > 0)
+    if channels == 4:
+        rgba = decoded
+    else:
+        rgba = np.empty((*encoded.shape[:2], 4), np.float32)
         rgba[..., :3] = decoded if channels == 3 else decoded[..., :1]
-    rgba[..., 3] = 1.0
-    if channels == 4 and image.alpha_mode != "NONE":
-        rgba[..., 3] = encoded[..., 3]
-        if table is None and image.alpha_mode != "CHANNEL_PACKED":  # float images are stored premultiplied
-            alpha = rgba[..., 3:]
-            np.divide(rgba[..., :3], alpha, out=rgba[..., :3], where=alpha > 0)
+    rgba[..., 3:] = alpha
     return rgba
-
-
-def _decode(encoded: np.ndarray, table: np.ndarray) -> np.ndarray:
-    """Bytes, which Blender hands out as shares of 255, by ``table``."""
-    byte = encoded * np.float32(255.0)
-    byte += np.float32(0.5)
-    return table.take(byte.astype(np.uint8), mode="clip")  # no need to check bounds, and faster than an index
 
 
 def _box_filter(pixels: np.ndarray, size: int, axis: int) -> np.ndarray:

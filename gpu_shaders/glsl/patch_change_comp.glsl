@@ -4,6 +4,8 @@
  * luminance, all of irradiance times a scale, so that squares of 1e-30 and of 1e30 both fit; and that scale.
  */
 
+const int AT_ONCE = 4; /* patches of a thread that are on their way from memory together */
+
 SHARED_ vec4 partial_sums[THREADS];
 
 void main()
@@ -12,13 +14,16 @@ void main()
   float unit = element(brightest, 0).x;
   float scale = unit > 1.0e-37 && unit < 1.0e37 ? 1.0 / unit : 1.0; /* light that is not finite is found by its sums */
   vec4 sum = vec4(0.0);
-  for (int i = lane; i < patch_count; i += THREADS) {
-    vec3 fresh = element(irradiance_new, i).rgb * scale;
-    vec3 old = element(irradiance_old, i).rgb * scale;
-    vec3 change = fresh - old;
-    vec3 last_change = old - element(irradiance_older, i).rgb * scale;
-    float weight = max(element(patch_seen, i).x, unseen);
-    sum += weight * vec4(dot(fresh, fresh), dot(change, change), dot(change, last_change), dot(fresh, vec3(0.2126, 0.7152, 0.0722)));
+  for (int first = lane; first < patch_count; first += AT_ONCE * THREADS) {
+    for (int k = 0; k < AT_ONCE; k++) {
+      int i = min(first + k * THREADS, patch_count - 1);
+      vec3 fresh = element(irradiance_new, i).rgb * scale;
+      vec3 old = element(irradiance_old, i).rgb * scale;
+      vec3 change = fresh - old;
+      vec3 last_change = old - element(irradiance_older, i).rgb * scale;
+      float weight = first + k * THREADS < patch_count ? max(element(patch_seen, i).x, unseen) : 0.0;
+      sum += weight * vec4(dot(fresh, fresh), dot(change, change), dot(change, last_change), dot(fresh, vec3(0.2126, 0.7152, 0.0722)));
+    }
   }
   partial_sums[lane] = sum;
   barrier();

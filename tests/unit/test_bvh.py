@@ -140,6 +140,16 @@ def test_the_tree_is_worth_its_name():
     assert cost.nodes.mean() < 40 and cost.triangles.mean() < 40
 
 
+def test_the_hierarchy_of_the_last_triangles_is_kept():
+    bvh.forget()
+    first, other = random_triangles(300), random_triangles(300, seed=4)
+    built = bvh.kept_or_built(first)
+    assert bvh.kept_or_built(first.copy()) is built
+    found = bvh.kept_or_built(other)
+    np.testing.assert_array_equal(found.nodes, bvh.build(other).nodes)
+    assert bvh.kept_or_built(first) is not built, "only the last ones are kept"
+
+
 def test_a_hundred_thousand_coincident_triangles():
     triangles = np.tile(random_triangles(1), (100_000, 1, 1))
     start = time.perf_counter()
