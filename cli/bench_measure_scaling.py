@@ -158,7 +158,6 @@ class _Bakes:
             "phases": clock.phases,
         }
 
-
     def _capture_again(self, session: BakeSession) -> float:
         """Seconds that capturing all probes takes when the scene is there: drivers send it with its first use."""
         batches, backend = session._batches, session.backend

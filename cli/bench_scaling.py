@@ -177,8 +177,8 @@ def _sweep_table(sweep: dict) -> list[str]:
     grown = growth(rows) if sweep["parameter"] == "triangles" else None
     if grown:
         lines.append(
-            f"from {BASE['triangles']} to {grown['to']} triangles a probe's capture, the scene being there, grows {grown['capture']:.2f} "
-            f"times, with its patches, their light and its field {grown['bake']:.2f} times"
+            f"from {BASE['triangles']} to {grown['to']} triangles a probe's capture, the scene being there, grows "
+            f"{grown['capture']:.2f} times, with its patches, their light and its field {grown['bake']:.2f} times"
         )
     if sweep["left_out"]:
         item = sweep["left_out"]

@@ -255,9 +255,7 @@ def patch_direct_comp(info, defines):
     _ints(info, "first_key", "first_light", "light_count", "seed")
     info.define("FIRST_LIGHT", "first_light")
     info.local_group_size(64, 1, 1)
-    return {
-        "compute": ["data_lib", "octahedral_lib", *_light_files(defines), "patch_lists_lib", "patch_direct_comp"]
-    }
+    return {"compute": ["data_lib", "octahedral_lib", *_light_files(defines), "patch_lists_lib", "patch_direct_comp"]}
 
 
 def patch_mean_comp(info, defines):
