@@ -7,6 +7,7 @@ float32.
 
 from __future__ import annotations
 
+import gpu
 import numpy as np
 
 from ..core import bvh, emitters
@@ -170,7 +171,12 @@ class SceneTextures:
     def surface_defines(self) -> dict:
         """For shaders that ask what surfaces are made of, and may trace rays."""
         stack_size = -(-self.hierarchy.stack_size // _STACK_STEP) * _STACK_STEP
-        return {"HAS_ALPHA": self.has_alpha, "HAS_IMAGES": self.has_images, "STACK_SIZE": stack_size}
+        return {
+            "HAS_ALPHA": self.has_alpha,
+            "HAS_IMAGES": self.has_images,
+            "STACK_SIZE": stack_size,
+            "LEAN_STACK": gpu.platform.device_type_get() != "SOFTWARE",
+        }
 
     @property
     def ray_defines(self) -> dict:

@@ -73,7 +73,7 @@ def test_directions_texels_and_harmonics(face):
 class RayScene:
     """Triangles on the GPU without materials."""
 
-    def __init__(self, corners):
+    def __init__(self, corners, lean=False):
         self.corners = np.asarray(corners, np.float32)
         self.hierarchy = bvh.build(self.corners)
         rows = np.zeros((len(self.corners), 3, 4), np.float32)
@@ -83,7 +83,7 @@ class RayScene:
             "bvh_nodes": textures.upload(self.hierarchy.nodes, "nodes"),
             "triangle_corners": textures.upload(rows, "corners"),
         }
-        self.defines = {"STACK_SIZE": self.hierarchy.stack_size}
+        self.defines = {"STACK_SIZE": self.hierarchy.stack_size} | ({"LEAN_STACK": ""} if lean else {})
 
     def trace(self, origins, directions, limits=1e30):
         """distance, triangle (in the caller's order), barycentric, any hit"""
@@ -103,13 +103,14 @@ class RayScene:
         return found[:, 0, 0], triangle, found[:, 0, 2:], found[:, 1, 0] > 0
 
 
-def test_rays_find_what_brute_force_finds():
+@pytest.mark.parametrize("lean", [False, True])
+def test_rays_find_what_brute_force_finds(lean):
     generator = np.random.default_rng(0)
     corners = (generator.uniform(-1, 1, (400, 1, 3)) + generator.normal(0, 0.15, (400, 3, 3))).astype(np.float32)
     origins = generator.uniform(-1.5, 1.5, (20_000, 3)).astype(np.float32)
     directions = random_directions(20_000)
     limits = generator.uniform(0.1, 2, 20_000).astype(np.float32)
-    distance, triangle, barycentric, blocked = RayScene(corners).trace(origins, directions, limits)
+    distance, triangle, barycentric, blocked = RayScene(corners, lean).trace(origins, directions, limits)
     expected = rays.closest_hit(corners.astype(float), origins.astype(float), directions.astype(float))
     agree = triangle == expected.triangle
     assert agree.mean() > 0.9995  # the rest graze an edge, where float32 decides otherwise
