@@ -41,18 +41,21 @@ PEER_SEED, REFERENCE_SEEDS = 1, (1_000_003, 2_000_003)  # panoramas take consecu
 
 
 def gridlight(request: dict, reporter, should_stop) -> int:
-    """Reading and baking with ``request["settings"]``: cold, then warm; irradiance at as many ``nodes`` as asked."""
+    """Reading and baking with ``request["settings"]``: cold, then warm; irradiance at as many ``nodes`` as asked. Or
+    once, where that is "only" the "first" of a process, with shaders that another has left in the drivers' cache."""
     scene = load_scene(request, reporter)
     settings = BakeSettings(**request["settings"])
-    cold = _bake_once(scene, request["scene"], settings, "cold", reporter, should_stop)
-    report(cold.row)
+    only = request.get("only")
+    last = _bake_once(scene, request["scene"], settings, only or "cold", reporter, should_stop)
+    report(last.row)
     warm: list[dict] = []
-    cold, started = None, time.perf_counter()  # a bake's textures are freed before the next starts
-    while not warm or (len(warm) < _MOST_WARM and time.perf_counter() - started < _WARM_SECONDS):
-        last = None
+    started = time.perf_counter()
+    while not only and (not warm or (len(warm) < _MOST_WARM and time.perf_counter() - started < _WARM_SECONDS)):
+        del last  # a bake's textures are freed before the next starts
         last = _bake_once(scene, request["scene"], settings, "warm", reporter, should_stop)
         warm.append(last.row)
-    report({**median_row(warm), "runs": len(warm)})
+    if warm:
+        report({**median_row(warm), "runs": len(warm)})
     result, snapshot = last.result, last.snapshot
     grid = result.field.grid
     facts = facts_about(request["scene"], snapshot, grid)

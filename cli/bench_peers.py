@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import tempfile
+
 import numpy as np
 
 from ..core import measures
@@ -29,19 +31,15 @@ def measure(run: Run) -> dict:
         "settings": run.settings_dict,
         "nodes": args.error_nodes if args.error else 0,
     }
-    ours, own_rows = peers.measure(request, "Gridlight", differences(settings) or "default")
-    if not {"scene", "device"} <= set(ours) or "problem" in own_rows[-1]:
-        raise InputError(
-            f"our own bake could not be measured: {own_rows[-1].get('problem') or 'its process said nothing'}"
-        )
-    nodes = ours.get("nodes", [])
-    reference = peers.errors(GALLERY, nodes, args.error_spp, settings.bands) if nodes else None
-    for panorama in CYCLES_SETTINGS:
-        request = cycles_request(GALLERY, panorama, args.panoramas, nodes, settings.bands)
-        peers.measure(request, "Cycles panoramas", panorama_name(panorama))
-    if not args.no_eevee:
-        request = {"peer": "eevee", "scene": GALLERY, "samples": args.eevee_samples, "nodes": nodes}
-        peers.measure(request, "EEVEE volume", f"{args.eevee_samples} samples")
+    setting = differences(settings) or "default"
+    with tempfile.TemporaryDirectory(prefix="gridlight-shaders-") as cache:
+        ours, own_rows = peers.measure({**request, "shader_cache": cache}, "Gridlight", setting)
+        if not {"scene", "device"} <= set(ours) or "problem" in own_rows[-1]:
+            raise InputError(
+                f"our own bake could not be measured: {own_rows[-1].get('problem') or 'its process said nothing'}"
+            )
+        reference = _others(peers, run, ours.get("nodes", []))
+        peers.measure({**request, "shader_cache": cache, "only": "first"}, "Gridlight", setting)
     warm_s = next(row["seconds"] for row in own_rows if row["run"] == "warm")
     peers.relate(ours["scene"]["locations"], warm_s)
     return {
@@ -53,6 +51,19 @@ def measure(run: Run) -> dict:
         "reference": reference,
         "status": ours["status"],
     }
+
+
+def _others(peers: Peers, run: Run, nodes: list) -> dict | None:
+    """Measures who else bakes the gallery. Returns what errors at ``nodes`` are held against; None without nodes."""
+    args, bands = run.args, run.settings.bands
+    reference = peers.errors(GALLERY, nodes, args.error_spp, bands) if nodes else None
+    for panorama in CYCLES_SETTINGS:
+        request = cycles_request(GALLERY, panorama, args.panoramas, nodes, bands)
+        peers.measure(request, "Cycles panoramas", panorama_name(panorama))
+    if not args.no_eevee:
+        request = {"peer": "eevee", "scene": GALLERY, "samples": args.eevee_samples, "nodes": nodes}
+        peers.measure(request, "EEVEE volume", f"{args.eevee_samples} samples")
+    return reference
 
 
 table = bench_peers_table.table

@@ -18,13 +18,21 @@ from pathlib import Path
 from . import worker
 
 # Whatever an earlier run left in the drivers' shader caches would make a first run look warm.
-NO_SHADER_CACHES = {"MESA_SHADER_CACHE_DISABLE": "true", "__GL_SHADER_DISK_CACHE": "0"}
+_NO_SHADER_CACHES = {"MESA_SHADER_CACHE_DISABLE": "true", "__GL_SHADER_DISK_CACHE": "0"}
+
+
+def _caches(folder: str | None) -> dict[str, str]:
+    """What tells drivers to cache shaders in ``folder`` alone, or nowhere."""
+    if folder is None:
+        return _NO_SHADER_CACHES
+    return {"MESA_SHADER_CACHE_DIR": folder, "__GL_SHADER_DISK_CACHE_PATH": folder, "__GL_SHADER_DISK_CACHE": "1"}
 
 
 def measure_in_child(
     request: dict, limit_s: float, options: list[str], in_blender: bool, verbose: bool
 ) -> tuple[list[dict], str]:
-    """Measures ``request`` (see ``bench_measure.measure``).
+    """Measures ``request`` (see ``bench_measure.measure``). Drivers cache shaders in its "shader_cache", a folder, or
+    not at all.
 
     Returns (what the process reported, why it ended early). The reason is empty where it did not; what was reported
     before counts all the same.
@@ -35,7 +43,11 @@ def measure_in_child(
         descriptors = (status_write, log.fileno(), alive_read)
         child = subprocess.Popen(
             [*_program(in_blender), "bench", "peers", "--measure", json.dumps(request), *options],
-            env={**os.environ, **NO_SHADER_CACHES, worker.DESCRIPTORS: ",".join(map(str, descriptors))},
+            env={
+                **os.environ,
+                **_caches(request.get("shader_cache")),
+                worker.DESCRIPTORS: ",".join(map(str, descriptors)),
+            },
             pass_fds=descriptors,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
