@@ -27,8 +27,6 @@ from .placement import judge_again
 from .result import BakeResult, Relit, check_scene
 from .volume_bake import VolumeBake
 
-_SMALL_CHANGE = 0.5  # of the light that bounces begin with: above, the light before is no better start than the dark
-
 
 class BakeSession(VolumeBake):
     """``bake`` once, then ``relight`` as often as the scene changes; ``result`` is that of the last one."""
@@ -84,7 +82,6 @@ class BakeSession(VolumeBake):
         """Light for patches that stay; returns whether they could."""
         light, relit = self.backend.light, self.result.relit
         assert relit is not None
-        before = light.source()
         emitters = changes.emission and (had_emitters or self.backend.scene.emitter_count > 0)
         lamps = self._changed_lamps(changes)
         if lamps.any() or changes.lights_removed or changes.world or emitters:
@@ -100,9 +97,7 @@ class BakeSession(VolumeBake):
             yield from judge_again(self._placement, self._batches, self.backend)
             if self._placement.is_outdated:
                 return False
-        small = light.changed_source(before) < _SMALL_CHANGE
-        relit.warm_start = bool(self.settings.bounces is None and small)
-        yield from self._bounce(relit.warm_start)
+        relit.warm_start = yield from self._bounce(warm=self.settings.bounces is None)
         if emitters:
             self.backend.forget_emission()
         self._mark_unshown(emission=emitters and self.backend.scene.emitter_count > 0)

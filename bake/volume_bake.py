@@ -34,6 +34,9 @@ from .result import BakeResult, Reporter, check_scene
 from .stopwatch import Stopwatch
 
 
+_SMALL_CHANGE = 0.25  # of light: where its sources changed by more, the light before is no better start than the dark
+
+
 @dataclass(frozen=True)
 class Part:
     """A block that is baked by a session of its own."""
@@ -219,14 +222,19 @@ class VolumeBake:
         yield from self.show()
         yield from self.finish()
 
-    def _bounce(self, warm: bool) -> Steps[None]:
-        """Iterates until the light has settled, from the dark or from the light before."""
+    def _bounce(self, warm: bool) -> Steps[bool]:
+        """Iterates until the light has settled, from the dark, or if ``warm`` from the light before, unless that is no
+        better start. Returns whether it was."""
         convergence = Convergence(self.settings.bounces, self.settings.tolerance)
         while not convergence.done:
             with self._stopwatch("light"):
                 energy, change, overlap, luminance = self.backend.light.iterate(
                     bounce=warm or convergence.iterations > 0
                 )
+                # The first step from settled light is by how much its sources changed.
+                if warm and not convergence.iterations and not change <= _SMALL_CHANGE**2 * energy:
+                    warm = False
+                    continue
                 self.result.energy.append(luminance)
                 factor = convergence.add(energy, change, overlap)
                 self._reporter.advance(1)
@@ -241,6 +249,7 @@ class VolumeBake:
         self.result.change = convergence.changes
         self.result.notes.append(convergence.reason)
         self._reason = convergence.reason
+        return warm
 
     def _mark_unshown(self, emission: bool) -> None:
         """The light of all probes has changed; with ``emission``, also what they see of sampled emitters."""

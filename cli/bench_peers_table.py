@@ -42,7 +42,7 @@ def _notes(summary: dict) -> list[str]:
     lines = [
         "Seconds for all locations; probes/s are locations by seconds. Every peer ran in a process of its own. Cold:",
         "first bake of its process, GPU context and shader compilation included. First: the same with shaders in the",
-        "driver's cache, as in every process but the first on a machine. Warm: a hierarchy is kept while triangles stay.",
+        "driver's cache, as in every process but a machine's first. Warm: the hierarchy is kept while triangles stay.",
         "Building the scene is not counted. Persistent: Cycles with persistent data; its first panorama carries the",
         "scene over. Projecting panoramas to SH is not counted.",
     ]

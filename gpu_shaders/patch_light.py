@@ -20,7 +20,7 @@ from ..core.settings import BakeSettings
 from ..core.steps import Pace, Steps, run
 from .dispatch import dispatch_linear
 from .growing_array import GrowingArray, copy_elements
-from .patch_direct import PatchDirect, add_patches, reduce_patches
+from .patch_direct import PatchDirect, reduce_patches
 from .patch_finder import PatchFinder
 from .programs import program
 from .scene_textures import SceneTextures
@@ -81,18 +81,6 @@ class PatchLight:
     def direct(self) -> gpu.types.GPUTexture:
         """Irradiance by lamps and sampled emitters, an element a patch."""
         return self._direct.texture
-
-    def changed_source(self, before: gpu.types.GPUTexture) -> float:
-        """By how much the irradiance that bounces begin with, direct and brought along, differs from ``before``, as a
-        share of what it is now (of the root of its squares)."""
-        energy, change = self._compare(self.source(), before, before)[:2]
-        return float(np.sqrt(change / energy)) if energy else float(change > 0)
-
-    def source(self) -> gpu.types.GPUTexture:
-        """A copy of the irradiance that bounces begin with, an element a patch."""
-        total = scratch(self.count, "patches")
-        add_patches(total, self.count, (self.direct, self._brought.texture))
-        return total
 
     # Rays
     # ------------------------------------------------------------------------------------------------------------------

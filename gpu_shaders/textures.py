@@ -69,7 +69,9 @@ def read(texture: gpu.types.GPUTexture, elements: int, channels: int = 4) -> np.
 
 def wait_for_gpu() -> None:
     """Returns when the GPU has done what it was told so far: commands are carried out in order."""
-    gpu.types.GPUTexture((1, 1), format="R32F").read()
+    mark = gpu.types.GPUTexture((1, 1), format="R32F")
+    mark.clear(format="FLOAT", value=(0.0,))  # what nothing was written to is read without waiting
+    mark.read()
 
 
 def _rows(elements: int, what: str) -> int:
