@@ -33,7 +33,6 @@ from .placement import Placement, place, vote
 from .result import BakeResult, Reporter, check_scene
 from .stopwatch import Stopwatch
 
-
 _SMALL_CHANGE = 0.25  # of light: where its sources changed by more, the light before is no better start than the dark
 
 
