@@ -99,12 +99,7 @@ class BakeTask:
         yield  # the first picture of the progress comes before the first work
         ensure_context()
         scene = self._find_scene()
-        volumes = self._find_volumes()
-        grids = [grid_of(volume) for volume in volumes]
         quality = scene.gridlight.quality
-        edits = [read_edits(scene, volume) for volume in volumes]
-        for grid in grids:
-            probe_file.check_size(grid, self.settings.bands)
         put_by_hand = animated_states(scene)
         view_layer: bpy.types.ViewLayer = scene.view_layers.get(self._view_layer)
         try:
@@ -114,7 +109,13 @@ class BakeTask:
             )
         except RuntimeError as error:  # Blender could not evaluate the scene at render quality now
             raise InputError(f"the scene cannot be read: {error}") from error
-        noticed = [*snapshot.warnings, *taken_back(self._find_scene(), put_by_hand)]
+        # Not before: reading evaluates the scene, and a volume that is animated then stands where the frame has it.
+        scene, volumes = self._find_scene(), self._find_volumes()
+        grids = [grid_of(volume) for volume in volumes]
+        edits = [read_edits(scene, volume) for volume in volumes]
+        for grid in grids:
+            probe_file.check_size(grid, self.settings.bands)
+        noticed = [*snapshot.warnings, *taken_back(scene, put_by_hand)]
         shown = yield from self._pace.in_background(part_hashes, shown_now)
         for warning in noticed:
             self.progress.warn(warning)

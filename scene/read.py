@@ -237,7 +237,7 @@ def _add_mesh(harvest: _Harvest, item, instance, matrix: np.ndarray, name: str) 
     attributes = frozenset().union(*(one.attributes for one in asked))
     key = (mesh.as_pointer(), attributes)
     if key not in harvest.meshes:
-        harvest.meshes[key] = copy_mesh(mesh, sorted(attributes)), name
+        harvest.meshes[key] = _copy_of(item, sorted(attributes)), name
     intensity = float(item.get(INTENSITY_PROPERTY, 1.0))
     alone = -1
     if any(one.instance for one in asked):
@@ -249,6 +249,16 @@ def _add_mesh(harvest: _Harvest, item, instance, matrix: np.ndarray, name: str) 
         group = harvest.groups[group_key] = _Instances(key, slots, intensity, facts)
     group.matrices.append(matrix)
     group.names.append(name)
+
+
+def _copy_of(item: bpy.types.Object, attributes: list[str]) -> MeshCopy:
+    """Of the mesh of an evaluated object. What is being edited lies outside the datablock, modifiers included."""
+    if not item.data.is_editmode:
+        return copy_mesh(item.data, attributes)
+    try:
+        return copy_mesh(item.to_mesh(), attributes)
+    finally:
+        item.to_mesh_clear()
 
 
 def _wants(harvest: _Harvest, material: bpy.types.Material | None) -> Wants:

@@ -56,7 +56,7 @@ def lines(context: bpy.types.Context, session: SceneSession, preview) -> list[st
         shown.append("Gridlight: no baked light yet, direct light alone")
     settings = context.scene.view_settings
     if settings.view_transform != "Standard" and preview.mode in ("FULL", "DIRECT", "INDIRECT", "IRRADIANCE"):
-        shown.append(f"The preview's colours are those of Standard; this scene renders with {settings.view_transform}")
+        shown.append(f"Colours: Standard; this scene renders with {settings.view_transform}")
     if preview.show_rate:
         shown.append(_rates(session))
     return shown

