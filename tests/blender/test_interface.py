@@ -341,6 +341,20 @@ def test_parented_and_turned_volumes_are_baked_where_they_stand(room, gpu_contex
     assert has_moved(room)
 
 
+def test_a_volume_whose_animation_overrules_the_hand_is_baked_where_it_then_stands(room, gpu_context):
+    parent = bpy.data.objects.new("Rig", None)
+    bpy.context.scene.collection.objects.link(parent)
+    parent.keyframe_insert("location", frame=1)
+    room.parent = parent
+    parent.location.x = 0.3
+    bpy.context.view_layer.update()
+    assert room.matrix_world.translation.x > 0.2
+    bpy.ops.gridlight.bake()
+    (warning,) = stored_metadata(room)["warnings"]
+    assert "'Rig' is animated" in warning
+    assert np.allclose(room.matrix_world.translation, 0) and np.allclose(load_field(room).grid.center, 0)
+
+
 def test_the_command_line_finds_the_same_edits(room):
     scene = bpy.context.scene
     bpy.ops.gridlight.place_probes()
