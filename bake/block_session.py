@@ -15,7 +15,7 @@ import numpy as np
 
 from ..core.blocks import Block, cut
 from ..core.clearance import Obstacles
-from ..core.conventions import ACTIVE, CULLED
+from ..core.conventions import CULLED
 from ..core.emitters import sampling_density
 from ..core.grid import Grid
 from ..core.orientation import ShellVote
@@ -38,7 +38,7 @@ from .volume_bake import Part, VolumeBake
 
 class BlockGround:
     """What the blocks of a bake have in common: scene and world on the GPU, ``state`` (P,) of the nodes before capture,
-    ``capture``. ``blocks`` are those with active probes, in their order."""
+    ``capture``. ``blocks`` are those with probes that capture, in their order."""
 
     def __init__(
         self,
@@ -54,22 +54,22 @@ class BlockGround:
         self.snapshot, self.grid, self.settings, self.edits, self.state = snapshot, grid, settings, edits, state
         self.scene, self.capture, self._pace = scene, capture, pace
         blocks = cut(grid, settings.block)
-        self.blocks = [block for block in blocks if len(blocks) == 1 or len(self.active(block))]
+        self.blocks = [block for block in blocks if len(blocks) == 1 or len(self.captured(block))]
         self._obstacles: Obstacles | None = None
 
     @property
     def object_count(self) -> int:
         return max(len(self.snapshot.object_names), 1)
 
-    def active(self, block: Block) -> np.ndarray:
-        """(S,) active nodes of ``block``, ascending."""
+    def captured(self, block: Block) -> np.ndarray:
+        """(S,) nodes of ``block`` that capture, ascending."""
         nodes = block.nodes()
-        return nodes[self.state[nodes] == ACTIVE]
+        return nodes[self.state[nodes] != CULLED]
 
     def open(self, block: Block) -> Steps[VolumeBake]:
         """``block``, with nothing captured yet."""
         state = np.full(self.grid.count, CULLED, np.uint8)
-        state[self.active(block)] = ACTIVE
+        state[self.captured(block)] = self.state[self.captured(block)]
         part = Part(block, state, self.capture, self.obstacles(block))
         bake = VolumeBake(
             self.snapshot, self.grid, self.settings, Silent(), self.edits, pace=self._pace, scene=self.scene, part=part
@@ -160,7 +160,7 @@ class BlockSession:
         making = SceneTextures.make(self.snapshot, self.grid.center, density, self._pace)
         scene = yield from self._stopwatch.steps("setup", making)
         state = yield from self._stopwatch.steps("cull", culling)
-        probes = int((state == ACTIVE).sum())
+        probes = int((state != CULLED).sum())
         capture, reason = choose_capture(self.settings, scene.triangle_count, probes)
         self.result.scene, self.result.capture = scene, capture
         self.result.notes.append(reason)
@@ -173,7 +173,7 @@ class BlockSession:
     def _light(self) -> Steps[None]:
         """From the first capture to the field."""
         ground = self._ground
-        probes = [len(ground.active(block)) for block in ground.blocks]
+        probes = [len(ground.captured(block)) for block in ground.blocks]
         if not self._keeps:
             self.result.notes.append(
                 f"texel surfaces of {sum(probes)} probes exceed the memory budget of {self.settings.memory_mib} MiB: "

@@ -9,13 +9,14 @@ from ..core import culling
 from ..core.conventions import ACTIVE, CULLED
 from ..core.errors import InputError
 from ..core.grid import Grid
+from ..core.open_air import OPEN, open_nodes
 from ..core.probe_edits import ProbeEdits
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 
 
 def cull(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, edits: ProbeEdits) -> np.ndarray:
-    """(P,) uint8 states before capture: ACTIVE or CULLED.
+    """(P,) uint8 states before capture: ACTIVE, CULLED, or OPEN for those culled that capture all the same.
 
     Raises:
         InputError: the user switched off every probe.
@@ -26,4 +27,5 @@ def cull(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, edits: Pro
     state[edits.disabled] = CULLED
     if edits.disabled.any() and not (state == ACTIVE).any():
         raise InputError(f"{grid.name}: every probe is switched off; bring some back with Reset in the Volume panel")
+    state[open_nodes(grid, state, edits.disabled)] = OPEN
     return state

@@ -9,15 +9,18 @@ from __future__ import annotations
 import numpy as np
 
 from ..core import dilation, gradients
-from ..core.conventions import ACTIVE, INVALID
+from ..core.conventions import ACTIVE, CULLED, INVALID
 from ..core.errors import InputError
 from ..core.field import Field, state_counts
 from ..core.grid import Grid
+from ..core.open_air import OPEN
 from ..core.orientation import inside_solid
 from ..core.settings import BakeSettings
 from .deringing import dering_field
 from .outcome import BlockOutcome
 from .result import BakeResult
+
+_AT_HOME = 1e-5  # cells: steps are rounded
 
 
 def complete(
@@ -32,7 +35,7 @@ def complete(
     """Fills field, counts, warnings and notes of ``result`` from ``outcomes`` of the blocks that hold active probes.
 
     Args:
-        state: (P,) before capture: active or culled; active probes that no outcome holds become invalid.
+        state: (P,) before capture, see ``cull``; active probes that no outcome holds become invalid.
         offset: (P, 3) metres by which the user moved probes.
 
     Raises:
@@ -41,7 +44,7 @@ def complete(
     nodes = np.concatenate([np.zeros(0, np.int64), *(outcome.nodes for outcome in outcomes)])
     shares = np.concatenate([np.zeros((0, 4), np.float32), *(outcome.shares for outcome in outcomes)])
     inside = inside_solid(shares)
-    states = state.copy()
+    states = np.where(state == OPEN, CULLED, state).astype(np.uint8)
     states[(state == ACTIVE) & ~np.isin(np.arange(grid.count), nodes)] = INVALID
     if len(inside) and inside.all():
         result.warnings.append(
@@ -49,7 +52,7 @@ def complete(
             "Flip the normals of what surrounds the volume, or move it out of solid geometry"
         )
     else:
-        states[nodes[inside]] = INVALID
+        states[nodes[inside & (state[nodes] == ACTIVE)]] = INVALID
     field = result.field = Field.empty(grid, settings.bands)
     field.state[:] = states
     field.offset[:] = offset
@@ -59,8 +62,14 @@ def complete(
         field.coefficients[outcome.nodes] = outcome.coefficients
         field.depth[outcome.nodes] = outcome.depth
         field.gradient[outcome.nodes] = outcome.gradient
-    field.coefficients = dilation.fill(grid, field.coefficients, states == ACTIVE)
-    field.gradient[states != ACTIVE] = 0.0
+    # Culled probes that turned out to stand in or behind something: as if they had not captured.
+    astray = inside | (
+        np.abs(field.offset - offset)[nodes].max(axis=1, initial=0.0) > _AT_HOME * grid.cell_size().min()
+    )
+    buried = nodes[(state[nodes] == OPEN) & astray]
+    field.depth[buried], field.validity[buried], field.offset[buried] = 0.0, 1.0, offset[buried]
+    field.coefficients = dilation.fill(grid, field.coefficients, field.holds_light)
+    field.gradient[~field.holds_light] = 0.0
     field.gradient = gradients.limited(grid, field.gradient, field.coefficients)
     if settings.deringing:
         result.notes.append(dering_field(field))

@@ -68,8 +68,8 @@ class Passes:
 
     def field_of(self, coefficients: np.ndarray) -> Field:
         """The field with ``coefficients`` (P, K, 3) of active probes, completed for the others."""
-        grid, active = self._first.grid, self._first.state == ACTIVE
-        filled = dilation.fill(grid, coefficients.astype(np.float32), active)
+        grid, known = self._first.grid, self._first.holds_light
+        filled = dilation.fill(grid, coefficients.astype(np.float32), known)
         gradient = (self._gradient / self._weight[:, None, None, None]).astype(np.float32)[:, :, : filled.shape[1]]
-        gradient[~active] = 0.0
+        gradient[~known] = 0.0
         return replace(self._first, coefficients=filled, gradient=gradients.limited(grid, gradient, filled))

@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.change_reach import RASTER_SPREAD, grown
-from ..core.conventions import ACTIVE
+from ..core.conventions import CULLED
 from ..core.scene_changes import SceneChanges, ShapeChange, compare
 from ..core.snapshot import SceneSnapshot
 from ..core.steps import Steps
@@ -146,9 +146,9 @@ class BakeSession(VolumeBake):
                     numbers = new_numbers(shape, old_order, backend.scene.hierarchy.order)
                     resolve_again(backend, surfaces, numbers if hierarchy == "rebuilt" else None)
             yield
-        again = np.isin(np.flatnonzero(self._state == ACTIVE), placement.nodes[again])
+        again = np.isin(np.flatnonzero(self._state != CULLED), placement.nodes[again])
         with self._stopwatch("capture"):
-            missing = batches.regroup(np.flatnonzero(self._state == ACTIVE))
+            missing = batches.regroup(np.flatnonzero(self._state != CULLED))
             again[missing] = True
         yield from self._stand_at_home()
         yield from batches.capture_again(np.flatnonzero(again))

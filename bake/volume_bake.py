@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core.blocks import Block
 from ..core.clearance import Obstacles
-from ..core.conventions import ACTIVE
+from ..core.conventions import CULLED
 from ..core.grid import Grid
 from ..core.orientation import ShellVote
 from ..core.probe_edits import ProbeEdits
@@ -41,7 +41,7 @@ class Part:
     """A block that is baked by a session of its own."""
 
     block: Block
-    state: np.ndarray  # (P,) before capture: no node outside the block is active
+    state: np.ndarray  # (P,) before capture: nodes outside the block are culled
     capture: str  # "raster" or "trace"
     obstacles: Obstacles  # what its probes keep clear of
 
@@ -110,12 +110,12 @@ class VolumeBake:
         self._state, placement = yield from self._stopwatch.steps("cull", placing)
         result.scene = self.backend.scene
         if self._part is None:
-            triangles, probes = self.backend.scene.triangle_count, int((self._state == ACTIVE).sum())
+            triangles, probes = self.backend.scene.triangle_count, int((self._state != CULLED).sum())
             result.capture, reason = choose_capture(self.settings, triangles, probes)
         else:
             result.capture, reason = self._part.capture, f"capture by {self._part.capture}, as for all blocks"
         result.notes.append(reason)
-        nodes = np.flatnonzero(self._state == ACTIVE)
+        nodes = np.flatnonzero(self._state != CULLED)
         self._batches = Batches(self.backend, nodes, result.capture, self._stopwatch, self._pace)
         if not self._batches.resident:
             result.notes.append(
@@ -126,10 +126,10 @@ class VolumeBake:
 
     def _cull_and_place(self) -> tuple[np.ndarray, Placement]:
         state = self._cull()
-        return state, self._at_home(np.flatnonzero(state == ACTIVE))
+        return state, self._at_home(np.flatnonzero(state != CULLED))
 
     def _cull(self) -> np.ndarray:
-        """(P,) uint8 states before capture: ACTIVE or CULLED."""
+        """(P,) uint8 states before capture, see ``cull``."""
         if self._part is not None:
             return self._part.state
         return cull(self.snapshot, self.grid, self.settings, self._edits)

@@ -25,8 +25,8 @@ class Field:
     ``offset`` is the displacement of the capture position from the node in metres. ``depth`` holds mean and mean
     square of the distance to the nearest surface in an octahedral map (row-major, DEPTH_EDGE² texels) in metres and
     metres². ``gradient`` is the change of the coefficients that irradiance needs, K of them, per metre along the
-    world's axes; zero where it is not given, and of probes without light of their own. ``metadata`` is the JSON part of
-    the probe file.
+    world's axes; zero where it is not given, and of probes without light of their own (``holds_light``).
+    ``metadata`` is the JSON part of the probe file.
     """
 
     grid: Grid
@@ -46,6 +46,12 @@ class Field:
     @property
     def bands(self) -> int:
         return bands_of(self.coefficients.shape[1])
+
+    @property
+    def holds_light(self) -> np.ndarray:
+        """(P,) bool: the light was captured there and not filled in from around. Besides active probes that are culled
+        ones in the open, which have depth statistics (core/open_air.py)."""
+        return (self.state == ACTIVE) | ((self.state == CULLED) & self.depth.any(axis=(1, 2)))
 
     @classmethod
     def empty(cls, grid: Grid, bands: int) -> Field:

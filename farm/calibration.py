@@ -12,7 +12,7 @@ from ..bake.block_session import BlockGround
 from ..bake.capture_choice import choose_capture
 from ..bake.cull import cull
 from ..core.blocks import Block
-from ..core.conventions import ACTIVE
+from ..core.conventions import CULLED
 from ..core.emitters import sampling_density
 from ..core.errors import Cancelled
 from ..core.grid import Grid
@@ -36,15 +36,15 @@ def calibrate(
     scene_seconds = time.perf_counter() - started
     edits = ProbeEdits.none(grid)
     state = cull(snapshot, grid, settings, edits)
-    capture = choose_capture(settings, scene.triangle_count, int((state == ACTIVE).sum()))[0]
+    capture = choose_capture(settings, scene.triangle_count, int((state != CULLED).sum()))[0]
     for most in _SIZES:
         ground = BlockGround(snapshot, grid, replace(settings, block=most), edits, state, scene, capture)
-        block = max(ground.blocks, key=lambda block: len(ground.active(block)))
+        block = max(ground.blocks, key=lambda block: len(ground.captured(block)))
         times = _bake(ground, block, should_stop)
         if most > _SIZES[0] or len(ground.blocks) == 1:
             see.append(times[0])
             settle.append(times[1])
-            sizes.append(len(ground.active(block)))
+            sizes.append(len(ground.captured(block)))
         if len(ground.blocks) == 1:
             break  # the whole grid is no larger
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024  # kibibytes on Linux

@@ -116,14 +116,14 @@ def _tell_cost(job: Path, plan: dict, settings, snapshot, grids, reporter, shoul
 
 
 def _plan_frame(args, scene, snapshot, settings, objects: Path) -> tuple[dict, list[dict[int, int]]]:
-    """The frame's entry, and of each volume the number of active probes by block."""
+    """The frame's entry, and of each volume the number of probes that capture by block."""
     import numpy as np
 
     from ..bake.capture_choice import choose_capture
     from ..bake.cull import cull
     from ..bake.result import BakeResult, check_scene
     from ..core.blocks import cut
-    from ..core.conventions import ACTIVE
+    from ..core.conventions import CULLED
     from ..core.probe_edits import ProbeEdits
     from ..formats import probe_file, probe_metadata
     from ..scene.probe_objects import edits_of
@@ -135,7 +135,7 @@ def _plan_frame(args, scene, snapshot, settings, objects: Path) -> tuple[dict, l
         probe_file.check_size(grid, settings.bands)
         edits = edits_of(scene, grid) or ProbeEdits.none(grid)
         state = cull(snapshot, grid, settings, edits)
-        active = [int((state[block.nodes()] == ACTIVE).sum()) for block in cut(grid, settings.block)]
+        active = [int((state[block.nodes()] != CULLED).sum()) for block in cut(grid, settings.block)]
         layout = container.write(
             objects, "volume", {}, {"state": state, "disabled": edits.disabled, "offset": edits.offset}
         )
@@ -146,7 +146,7 @@ def _plan_frame(args, scene, snapshot, settings, objects: Path) -> tuple[dict, l
                 "resolution": [int(count) for count in grid.resolution],
                 "layout": layout.name,
                 "active": active,
-                "capture": choose_capture(settings, len(snapshot.triangles), int((state == ACTIVE).sum()))[0],
+                "capture": choose_capture(settings, len(snapshot.triangles), int((state != CULLED).sum()))[0],
                 "warnings": checked.warnings,
             }
         )

@@ -149,7 +149,7 @@ class ShardRunner:
         asks for it, the oldest first."""
         if index not in place.open:
             block = next(block for block in place.ground.blocks if block.index == index)
-            room = probes_in_budget(self.settings) - len(place.ground.active(block))
+            room = probes_in_budget(self.settings) - len(place.ground.captured(block))
             for other in list(place.open):
                 if sum(len(held.bake.nodes) for held in place.open.values()) > max(room, 0):
                     self._give_up(place, other)

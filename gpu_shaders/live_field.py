@@ -37,7 +37,7 @@ class LiveField:
         rows = np.zeros((3, 4), np.float32)
         rows[:, :3] = cell_axes(field.grid).T
         self._cells = uniform_block(rows)
-        dark = np.flatnonzero(field.state != ACTIVE) if (field.state == ACTIVE).any() else np.zeros(0, int)
+        dark = np.flatnonzero(~field.holds_light) if (field.state == ACTIVE).any() else np.zeros(0, int)
         self._dark_count = len(dark)
         fill = np.full((len(dark), 8), -1.0, np.float32)
         fill[:, :6], fill[:, 6] = neighbours(field.grid, dark), dark
