@@ -3,7 +3,8 @@
 
 Rays between patches and the texels of probes find a luminous ceiling often enough; of a lamp smaller than a cell they
 hit too little, or nothing. Emitters smaller than a cell are therefore sampled: as lights at patches, and as extra
-directions in the probes themselves, where one ray per texel may miss them.
+directions in the probes themselves, where one ray per texel may miss them. So are those that are a small part of all
+surface, such as a screen in a room: the few rays of a patch find them too seldom, however many cells they fill.
 """
 
 from __future__ import annotations
@@ -19,13 +20,14 @@ PROBE_POINTS = 4096  # on emitters that each probe considers besides its texels
 EMITTER_BOXES = 8  # around all of them, by which points know that none is near
 PROBE_RAYS = 256  # that it sends to them
 _MOST_AREA_SHARE = 0.25  # of all surface: a scene that glows all over is resolved by any grid
+_SELDOM_SHARE = 0.05  # of all surface: of a hundred rays five would find it
 
 
 def sampling_density(snapshot: SceneSnapshot, grid: Grid) -> np.ndarray:
     """(T,) probability density per m² with which a point on each triangle is chosen as a light sample; integrates to 1.
 
     Proportional to luminance of the emission; 0 everywhere where nothing is sampled. An object's emission is sampled
-    when the area that glows is no larger than the square of a cell's diagonal.
+    when the area that glows is no larger than the square of a cell's diagonal, or a small share of all surface.
     """
     luminance = _luminance(snapshot)[snapshot.material_index]
     density = np.zeros(len(snapshot.triangles))
@@ -35,7 +37,8 @@ def sampling_density(snapshot: SceneSnapshot, grid: Grid) -> np.ndarray:
     corners = snapshot.vertices[snapshot.triangles]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
     per_object = np.bincount(snapshot.object_index[glowing], area[glowing], len(snapshot.object_names))
-    small = per_object[snapshot.object_index[glowing]] <= float((grid.cell_size() ** 2).sum())
+    most = max(float((grid.cell_size() ** 2).sum()), _SELDOM_SHARE * float(area.sum()))
+    small = per_object[snapshot.object_index[glowing]] <= most
     sampled = glowing[small & (area[glowing] > 0)]
     if area[sampled].sum() > _MOST_AREA_SHARE * area.sum():
         return density
