@@ -58,13 +58,14 @@ def sample_light(light: Light, points: np.ndarray, u: np.ndarray) -> LightSample
     """The sample of ``light`` that numbers ``u`` (N, 2) in [0, 1) pick at each of ``points`` (N, 3)."""
     if light.kind == "SUN":
         return _sample_sun(light, u)
-    if light.kind == "AREA":
-        return _sample_area(light, points, u)
-    sample = _sample_point(light, points, u)
+    sample = (_sample_area if light.kind == "AREA" else _sample_point)(light, points, u)
+    factor = np.ones((len(points), 1))
     if light.kind == "SPOT":
-        mask = spot_mask(light, sample.directions)
-        return LightSamples(sample.directions, sample.distances, sample.irradiance * mask[:, None])
-    return sample
+        factor = spot_mask(light, sample.directions)[:, None]
+    if light.profile is not None:
+        local = -sample.directions @ np.asarray(light.matrix, float)[:3, :3]
+        factor = factor * light.profile.factor(local, sample.distances)
+    return LightSamples(sample.directions, sample.distances, sample.irradiance * factor)
 
 
 def _sample_sun(light: Light, u: np.ndarray) -> LightSamples:

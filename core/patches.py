@@ -28,7 +28,7 @@ import numpy as np
 from .grid import Grid
 
 POINTS = 16  # places of a patch where light is measured
-RAYS = 4  # that leave a patch for others, from its points in turn; a multiple of 4
+RAYS = 8  # that leave a patch for others, from its points in turn; a multiple of 4
 SAMPLES = (1, 4, 16, 64)  # of direct light, by the error that one would leave
 MOST_PARTS = 16  # in which direct light of lamps is kept
 EMITTERS, ALL = "emitters", "all"
@@ -48,6 +48,7 @@ VARIANTS = 3  # patches of one cell that do not see each other; hits beyond join
 _FINEST = -10  # level: cells of 2⁻¹⁰ of the plain size
 _SHIFT = 0.37  # of a cell: walls tend to lie at round numbers
 _AXIS_BITS = 18
+_SHEET_KEY = np.uint64(0x9E3779B97F4A7C15)  # odd: tells the cells of one sheet from those of another
 _SCRAMBLE, _UNSCRAMBLE = np.uint32(0x9E3779B1), np.uint32(0x0E8B2F51)  # inverse to each other modulo 2³²
 _NOBODY = np.uint32(0xFFFFFFFF)
 MOST_ROUNDS = 12  # of rays that find surface which nothing has seen before
@@ -136,7 +137,8 @@ class Patches:
     """All patches of a bake.
 
     ``points`` (N, POINTS, 4) float32: position and packed normal; the first is the leader, which every hit of the
-    patch sees. ``seen`` (N,) bool: a texel of a probe lies on it.
+    patch sees. ``seen`` (N,) bool: a texel of a probe lies on it. ``sheets`` (N,) int: the sheet that it is part of
+    (core/sheets.py), 0 for none.
     """
 
     def __init__(self, grid: Grid):
@@ -146,6 +148,7 @@ class Patches:
         self._ids = [np.zeros(0, np.int64) for _ in range(VARIANTS)]
         self.points = np.zeros((0, POINTS, 4), np.float32)
         self.seen = np.zeros(0, bool)
+        self.sheets = np.zeros(0, np.int64)
 
     @property
     def count(self) -> int:
@@ -159,17 +162,20 @@ class Patches:
         found: bool = True,
         coarser: int = 0,
         row_length: int = 4,
+        sheets: np.ndarray | None = None,
     ) -> np.ndarray:
         """(H,) patch of each of ``hits`` (H, 4), position and packed normal; NO_PATCH for hits with a negative one.
         Patches that are missing are founded, or left NO_PATCH without ``found``.
 
         ``view_distance`` (H,) metres to the probe whose texels the hits are; None for ends of rays between patches.
         ``sees(items, patches)`` tells which hits (by number) see the leader of a patch. ``row_length``: hits in a row,
-        whose neighbours lie side by side.
+        whose neighbours lie side by side. ``sheets`` (H,) int: the sheet that each hit lies on; None for no sheets.
         """
+        sheets = np.zeros(len(hits), np.int64) if sheets is None else sheets
         result = np.full(len(hits), NO_PATCH, np.int64)
         pending = np.flatnonzero(hits[:, 3] >= 0)
         keys = self._rule.keys(hits[pending], None if view_distance is None else view_distance[pending], coarser)
+        keys = keys + sheets[pending].astype(np.uint64) * _SHEET_KEY
         first_new = self.count
         leads = np.zeros(len(hits), bool)
         for variant in range(VARIANTS):
@@ -178,7 +184,7 @@ class Patches:
             unique, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
             known = self._known(variant, unique)
             if found:
-                self._found(variant, unique, known, pending[first], hits)
+                self._found(variant, unique, known, pending[first], hits, sheets)
             ids = known[inverse]
             joined = (ids >= first_new) & (first[inverse] == np.arange(len(pending)))  # a leader sees itself
             leads[pending[joined]] = True
@@ -194,17 +200,21 @@ class Patches:
         return result
 
     def bind_ends(
-        self, hits: np.ndarray, round_: int, sees: Callable[[np.ndarray, np.ndarray], np.ndarray]
+        self,
+        hits: np.ndarray,
+        round_: int,
+        sees: Callable[[np.ndarray, np.ndarray], np.ndarray],
+        sheets: np.ndarray | None = None,
     ) -> np.ndarray:
         """(H,) patches on which rays of a round end, NOTHING for ``hits`` (H, 4) without surface, where no light comes
         back. What only rays see gets the coarser patches the more rays it takes to see it, in the last round none."""
-        ends = self.bind(hits, None, sees, found=round_ == 0)
+        ends = self.bind(hits, None, sees, found=round_ == 0, sheets=sheets)
         lost = (ends == NO_PATCH) & (hits[:, 3] >= 0)
         ends[hits[:, 3] < 0] = NOTHING
         if lost.any() and 0 < round_ < MOST_ROUNDS - 1:
             alone = hits.copy()
             alone[~lost, 3] = -1.0
-            ends[lost] = self.bind(alone, None, sees, coarser=coarser_by(round_))[lost]
+            ends[lost] = self.bind(alone, None, sees, coarser=coarser_by(round_), sheets=sheets)[lost]
         return ends
 
     def _known(self, variant: int, unique: np.ndarray) -> np.ndarray:
@@ -218,7 +228,13 @@ class Patches:
         return result
 
     def _found(
-        self, variant: int, unique: np.ndarray, known: np.ndarray, leaders: np.ndarray, hits: np.ndarray
+        self,
+        variant: int,
+        unique: np.ndarray,
+        known: np.ndarray,
+        leaders: np.ndarray,
+        hits: np.ndarray,
+        sheets: np.ndarray,
     ) -> None:
         """Founds patches for those of the sorted keys ``unique`` (U,) that are not in ``known`` (U,), led by the hits
         ``leaders`` (U,), numbered in their order, and completes ``known``."""
@@ -231,6 +247,7 @@ class Patches:
         points = np.repeat(hits[leaders[in_order], None], POINTS, axis=1).astype(np.float32)
         self.points = np.concatenate([self.points, points])
         self.seen = np.concatenate([self.seen, np.zeros(len(fresh), bool)])
+        self.sheets = np.concatenate([self.sheets, sheets[leaders[in_order]]])
 
     def _choose_points(self, first_new: int, hits: np.ndarray, patch: np.ndarray, row_length: int) -> None:
         """Points of the patches from ``first_new`` on beside their leaders: a hit competes for one of POINTS places, by

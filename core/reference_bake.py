@@ -28,10 +28,10 @@ from .cubemap import (
 from .direct_light import sample_light
 from .field import Field
 from .grid import Grid
+from .open_air import open_nodes
 from .orientation import ShellVote, inside_solid
 from .patches import gather_rays
-from .rays import pull_back
-from .reference_light import ReferenceLight
+from .reference_light import ReferenceLight, off_surface
 from .reference_scene import ReferenceScene, Surfaces
 from .sampling import keys_of, sample_r2
 from .settings import BakeSettings
@@ -45,8 +45,8 @@ _SUN_STREAM = 0x7F4A7C15
 class ReferenceBake:
     """One bake of ``snapshot`` into ``grid``, stage by stage, so that tests can compare each with the GPU's.
 
-    ``nodes`` (S,) are the grid nodes that capture. ``offset`` (grid.count, 3) metres are moves of probes out of walls,
-    which the reference takes as given (core/relocation.py).
+    ``nodes`` (S,) are the grid nodes that capture, active ones and those in the open. ``offset`` (grid.count, 3) metres
+    are moves of probes out of walls, which the reference takes as given (core/relocation.py).
     """
 
     def __init__(self, snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, offset: np.ndarray | None = None):
@@ -57,7 +57,8 @@ class ReferenceBake:
         self.solid_angles = np.tile(texel_solid_angles(settings.face).ravel(), 6)
         needed = settings.keep_all or culling.needed_nodes(grid, snapshot.triangle_positions)
         self.state = np.where(np.broadcast_to(needed, grid.count), ACTIVE, CULLED).astype(np.uint8)
-        self.nodes = np.flatnonzero(self.state == ACTIVE)
+        in_the_open = open_nodes(grid, self.state, np.zeros(grid.count, bool))
+        self.nodes = np.sort(np.concatenate([np.flatnonzero(self.state == ACTIVE), in_the_open]))
         self.offset = np.zeros((grid.count, 3)) if offset is None else np.asarray(offset, float)
         self.positions = (grid.positions() + self.offset)[self.nodes] - grid.center
 
@@ -87,15 +88,23 @@ class ReferenceBake:
         reflects = (surfaces.triangle >= 0) & surfaces.albedo.any(axis=2)
         hits[..., 3] = -1.0
         directions = np.broadcast_to(self.directions, self.points(surfaces).shape)[reflects]
-        hits[reflects, :3] = pull_back(self.points(surfaces)[reflects], directions, surfaces.distance[reflects])
+        sheets = self.texel_sheets(surfaces)[reflects]
+        hits[reflects, :3] = off_surface(
+            self.points(surfaces)[reflects], directions, surfaces.distance[reflects], sheets
+        )
         hits[reflects, 3] = pack_normal(octahedral_encode(surfaces.normal[reflects]))
         return hits
+
+    def texel_sheets(self, surfaces: Surfaces) -> np.ndarray:
+        """(P, X) sheets that the texels see, 0 for none."""
+        return np.where(surfaces.triangle >= 0, self.scene.sheet[surfaces.triangle], 0)
 
     def bind(self, surfaces: Surfaces) -> np.ndarray:
         """(P, X) patches that the texels lie on, founded where there are none; −1 where nothing is to be lit."""
         hits = self.texel_hits(surfaces)
         distance = np.linalg.norm(hits[..., :3] - self.positions[:, None], axis=2)
-        return self.light.bind_texels(hits.reshape(-1, 4), distance.ravel()).reshape(surfaces.triangle.shape)
+        sheets = self.texel_sheets(surfaces).ravel()
+        return self.light.bind_texels(hits.reshape(-1, 4), distance.ravel(), sheets).reshape(surfaces.triangle.shape)
 
     def reflected(self, surfaces: Surfaces, patch: np.ndarray, irradiance: np.ndarray) -> np.ndarray:
         """(P, X, 3) radiance that texels reflect by the ``irradiance`` (N, 3) of their ``patch`` (P, X)."""
@@ -150,10 +159,13 @@ class ReferenceBake:
         shares = self.shares(surfaces, reflected)
         field = Field.empty(self.grid, self.settings.bands)
         field.state[:] = self.state
-        field.state[self.nodes[inside_solid(shares)]] = INVALID
         field.validity[self.nodes] = 1 - shares[:, 0]
         field.depth[self.nodes] = self.depth_moments(surfaces)
         field.offset[:] = self.offset
+        inside = self.nodes[inside_solid(shares)]
+        buried = inside[self.state[inside] == CULLED]
+        field.depth[buried], field.validity[buried] = 0.0, 1.0
+        field.state[inside[self.state[inside] == ACTIVE]] = INVALID
         return field
 
     # Field
@@ -230,15 +242,16 @@ def bake(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, offset: np
     irradiance = job.light.iterate(settings.bounces)
     if settings.gather:
         hits = job.texel_hits(surfaces).reshape(-1, 4)
-        irradiance = job.light.gather(hits, gather_rays(settings.samples), irradiance, 0)
+        sheets = job.texel_sheets(surfaces).ravel()
+        irradiance = job.light.gather(hits, gather_rays(settings.samples), irradiance, 0, sheets)
         patch = np.where(patch >= 0, np.arange(patch.size).reshape(patch.shape), patch)
     reflected = job.reflected(surfaces, patch, irradiance)
     coefficients = job.project(surfaces, reflected) + job.project_emitters(surfaces) + job.project_suns()
     field.coefficients = np.zeros((grid.count, settings.bands**2, 3))
     field.coefficients[job.nodes] = coefficients
-    field.coefficients = dilation.fill(grid, field.coefficients, field.state == ACTIVE)
+    field.coefficients = dilation.fill(grid, field.coefficients, field.holds_light)
     field.gradient = field.gradient.astype(float)
     field.gradient[job.nodes] = job.gradient(surfaces, reflected)
-    field.gradient[field.state != ACTIVE] = 0.0
+    field.gradient[~field.holds_light] = 0.0
     field.gradient = gradients.limited(grid, field.gradient, field.coefficients)
     return field

@@ -45,17 +45,20 @@ from .world_suns import extract_suns
 _RAISE = 0.15  # of the distance between hit and leader: both ends of a line of sight are raised by it
 _RAY_STREAM, _PATH_LIGHT_STREAM = 0x85EBCA6B, 0x1B873593
 _EMITTER_STREAM, _PLACE_STREAM = 0x2545F491, 0x85EBCA6B
+_BACK_STREAM, _SIDE_STREAM = 0x51ED2705, 0x6C8E9CF5
 _RAY_SPREAD = 0.5  # radians: rays between patches see images blurred
 
 
 @dataclass
 class PatchRays:
     """What rays found: ``hits`` (N, R, 4) position and packed normal, −1 where nothing more can come; ``carried`` (N,
-    R, 3) radiance that they brought along; ``reflected`` (N, R, 3) product of the albedos on the way."""
+    R, 3) radiance that they brought along; ``reflected`` (N, R, 3) product of the albedos on the way; ``sheets`` (N, R)
+    the sheets on which they end."""
 
     hits: np.ndarray
     carried: np.ndarray
     reflected: np.ndarray
+    sheets: np.ndarray
 
     @property
     def brought(self) -> np.ndarray:
@@ -78,9 +81,14 @@ class ReferenceLight:
     # Which patch
     # ------------------------------------------------------------------------------------------------------------------
 
-    def bind_texels(self, hits: np.ndarray, distance: np.ndarray) -> np.ndarray:
-        """(H,) patches of texels ``hits`` (H, 4) seen from ``distance`` (H,) metres."""
-        return self.patches.bind(hits, distance, self._sees(hits))
+    def bind_texels(self, hits: np.ndarray, distance: np.ndarray, sheets: np.ndarray | None = None) -> np.ndarray:
+        """(H,) patches of texels ``hits`` (H, 4) on ``sheets`` (H,) seen from ``distance`` (H,) metres."""
+        return self.patches.bind(hits, distance, self._sees(hits), sheets=sheets)
+
+    @property
+    def patch_sheets(self) -> np.ndarray | None:
+        """(N,) sheets that the patches are part of; None in scenes without."""
+        return self.patches.sheets if self.scene.sheet.any() else None
 
     def _sees(self, hits: np.ndarray):
         return lambda items, patches: self.sees_leader(hits[items], self.patches.points[patches, 0])
@@ -112,7 +120,8 @@ class ReferenceLight:
             self._effort = effort(self.patches.count, self.settings.samples)
         numbers = np.arange(lit, self.patches.count)
         parts = light_parts(len(self._all_lamps()), self.emitters.count > 0)
-        spread = {part: self.spread(self.patches.points, numbers, part) for part in parts}
+        sheets = self.patch_sheets
+        spread = {part: self.spread(self.patches.points, numbers, part, sheets) for part in parts}
         light = sum((mean for mean, _deviation in spread.values()), np.zeros(len(numbers)))
         direct = np.zeros((len(numbers), 3))
         for part, (mean, deviation) in spread.items():
@@ -120,11 +129,13 @@ class ReferenceLight:
             for index, samples in enumerate(SAMPLES):
                 chosen = np.flatnonzero(sample_class == index)
                 direct[chosen] += self.direct_light(
-                    self.patches.points, numbers[chosen], samples * self._effort, part=part
+                    self.patches.points, numbers[chosen], samples * self._effort, part=part, sheets=sheets
                 )
         self.direct = np.concatenate([self.direct, direct])
 
-    def spread(self, points: np.ndarray, numbers: np.ndarray, part: Part) -> tuple[np.ndarray, np.ndarray]:
+    def spread(
+        self, points: np.ndarray, numbers: np.ndarray, part: Part, sheets: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Mean and standard deviation (C,) of the luminance of one sample's irradiance by ``part`` at every second
         point of the patches ``numbers`` (C,) if nothing stands between.
 
@@ -137,25 +148,34 @@ class ReferenceLight:
         candidate_variance = np.zeros(len(numbers))
         for index in range(count):
             point, normal = _split(points[numbers, 2 * index])
-            if part == EMITTERS:
-                one, other = (
-                    self.emitters.unshadowed(point, normal, keys, number) @ LUMINANCE
-                    for number in (2 * index, 2 * index + 1)
-                )
-                near = self.emitters.by_directions(leave_surface(point, normal), normal, keys, index) @ LUMINANCE
-                luminance[index] = (one + other) / 2 + near
-                candidate_variance += (one - other) ** 2 / 2 / count
-            else:
-                lamps = self._lamps(point, point, normal, keys, index, shadows=False, part=part)
-                luminance[index] = lamps @ LUMINANCE
+            for side, normals, side_keys, share in self._sides(normal, keys, numbers, sheets):
+                weight = share @ LUMINANCE
+                if part == EMITTERS:
+                    one, other = (
+                        self.emitters.unshadowed(point[side], normals, side_keys, number) @ LUMINANCE * weight
+                        for number in (2 * index, 2 * index + 1)
+                    )
+                    start = leave_surface(point[side], normals)
+                    near = self.emitters.by_directions(start, normals, side_keys, index) @ LUMINANCE
+                    luminance[index, side] += (one + other) / 2 + near * weight
+                    candidate_variance[side] += (one - other) ** 2 / 2 / count
+                else:
+                    lamps = self._lamps(point[side], point[side], normals, side_keys, index, shadows=False, part=part)
+                    luminance[index, side] += lamps @ LUMINANCE * weight
         variance = np.maximum(luminance.var(axis=0) - candidate_variance / 2, 0.0) + candidate_variance / CANDIDATES
         return luminance.mean(axis=0), np.sqrt(variance)
 
     def direct_light(
-        self, points: np.ndarray, numbers: np.ndarray, samples: int, first_key: int = 0, part: Part = ALL
+        self,
+        points: np.ndarray,
+        numbers: np.ndarray,
+        samples: int,
+        first_key: int = 0,
+        part: Part = ALL,
+        sheets: np.ndarray | None = None,
     ) -> np.ndarray:
         """(C, 3) irradiance by ``part`` of the light: mean over ``samples`` places spread over points of the patches
-        ``numbers`` (C,)."""
+        ``numbers`` (C,), on both sides where the patch is part of one of ``sheets`` (N,)."""
         keys = keys_of(first_key + numbers, 0, self.settings.seed)
         total = np.zeros((len(numbers), 3))
         each = points.shape[1]
@@ -163,9 +183,24 @@ class ReferenceLight:
         for index in range(samples):
             place = (index * each + shift) // samples if samples < each else index % each
             point, normal = _split(points[numbers, place])
-            origin = leave_surface(point, normal)
-            total += self._irradiance(point, origin, normal, keys, shifted(keys, 0, 0, _EMITTER_STREAM), index, part)
+            for side, normals, side_keys, share in self._sides(normal, keys, numbers, sheets):
+                emitter_keys = shifted(side_keys, 0, 0, _EMITTER_STREAM)
+                origin = leave_surface(point[side], normals)
+                total[side] += share * self._irradiance(
+                    point[side], origin, normals, side_keys, emitter_keys, index, part
+                )
         return total / samples
+
+    def _sides(self, normal: np.ndarray, keys: np.ndarray, numbers: np.ndarray, sheets: np.ndarray | None):
+        """The sides of places with ``normal`` (C, 3) from which their patches ``numbers`` (C,) take light: which places
+        have that side, their normals and random keys there, and the share (K, 3) of that side."""
+        if sheets is None:
+            yield slice(None), normal, keys, np.ones((len(normal), 3))
+            return
+        through = self.scene.sheet_shares[sheets[numbers]]
+        yield slice(None), normal, keys, 1 - through
+        back = np.flatnonzero(through.any(axis=1))
+        yield back, -normal[back], shifted(keys[back], 0, _BACK_STREAM, 0), through[back]
 
     def _all_lamps(self) -> list[Light]:
         """Lamps and suns of the world."""
@@ -193,17 +228,28 @@ class ReferenceLight:
     # ------------------------------------------------------------------------------------------------------------------
 
     def trace(
-        self, points: np.ndarray, numbers: np.ndarray, rays_each: int, segments: int = 1, first_key: int = 0
+        self,
+        points: np.ndarray,
+        numbers: np.ndarray,
+        rays_each: int,
+        segments: int = 1,
+        first_key: int = 0,
+        sheets: np.ndarray | None = None,
     ) -> PatchRays:
         """``rays_each`` rays of each of the patches ``numbers`` (C,). With ``segments`` above 1 they go on as paths,
-        and direct light is sampled where they bounce."""
+        and direct light is sampled where they bounce. Of patches on one of ``sheets`` (N,) every second ray leaves from
+        the back."""
         patch, index = np.repeat(numbers, rays_each), np.tile(np.arange(rays_each), len(numbers))
         at = points[patch, index * points.shape[1] // rays_each % points.shape[1]]
         point, normal = _split(at)
+        through = self.scene.sheet_shares[np.zeros(len(patch), int) if sheets is None else sheets[patch]]
+        crosses = through.any(axis=1) & (index % 2 == 1)
+        normal[crosses] *= -1
         origin = leave_surface(point, normal)
         keys = keys_of(first_key + patch, _RAY_STREAM, self.settings.seed)
-        hits = np.zeros((len(patch), 4))
-        carried, reflected = np.zeros((len(patch), 3)), np.where(at[:, 3:] < 0, 0.0, np.ones((len(patch), 3)))
+        hits, end_sheets = np.zeros((len(patch), 4)), np.zeros(len(patch), np.int64)
+        carried, reflected = np.zeros((len(patch), 3)), _side_weight(through, crosses)
+        reflected[at[:, 3] < 0] = 0.0
         for segment in range(segments):
             alive = np.flatnonzero(reflected.any(axis=1))
             u = sample_r2(shifted(keys[alive], 0, segment, 0), index[alive]).astype(float)
@@ -218,41 +264,59 @@ class ReferenceLight:
             carried[alive] += reflected[alive] * seen
             reflected[alive] *= surface.albedo  # zero where a ray missed
             position = origin[alive] + direction * np.where(missed, 0.0, found.distance)[:, None]
-            hits[alive, :3] = pull_back(position, direction, np.where(missed, 0.0, found.distance))
+            sheet = np.where(missed, 0, self.scene.sheet[found.triangle])
+            end_sheets[alive] = sheet
+            hits[alive, :3] = off_surface(position, direction, np.where(missed, 0.0, found.distance), sheet)
             hits[alive, 3] = _pack(surface.normal, ~missed)
             if segment < segments - 1:
                 on = reflected[alive].any(axis=1)
-                alive, surface_normal = alive[on], surface.normal[on]
-                start = step_off(position[on], surface_normal, -direction[on], found.distance[on])
+                alive, facing = alive[on], surface.normal[on]
                 here = shifted(keys[alive], 0, _PATH_LIGHT_STREAM + segment, 0)
-                arriving = self._irradiance(position[on], start, surface_normal, here, here, index[alive])
+                arriving = np.zeros((len(alive), 3))
+                for side, normals, side_keys, share in self._sides(facing, here, np.arange(len(alive)), sheet[on]):
+                    towards = np.where((normals * facing[side]).sum(axis=1, keepdims=True) > 0, -1, 1)
+                    start = step_off(
+                        position[on][side], normals, towards * direction[on][side], found.distance[on][side]
+                    )
+                    arriving[side] += share * self._irradiance(
+                        position[on][side], start, normals, side_keys, side_keys, index[alive][side]
+                    )
                 carried[alive] += reflected[alive] * arriving / np.pi
-                normal[alive], origin[alive] = surface_normal, start
+                through = self.scene.sheet_shares[sheet[on]]
+                side = pcg3d(shifted(keys[alive], 0, _SIDE_STREAM + segment, 0) + _number(index[alive]))[:, 0]
+                crosses = through.any(axis=1) & (side % 2 == 1)
+                reflected[alive] *= _side_weight(through, crosses)
+                turn = np.where(crosses, -1.0, 1.0)[:, None]
+                normal[alive] = turn * facing
+                origin[alive] = step_off(position[on], normal[alive], -turn * direction[on], found.distance[on])
         hits[~reflected.any(axis=1)] = (0.0, 0.0, 0.0, -1.0)
         shape = (len(numbers), rays_each)
-        return PatchRays(*(values.reshape(*shape, -1) for values in (hits, carried, reflected)))
+        return PatchRays(
+            hits.reshape(*shape, 4), carried.reshape(*shape, 3), reflected.reshape(*shape, 3), end_sheets.reshape(shape)
+        )
 
     def connect(self) -> None:
         """Traces rays between patches until they find no surface that is no patch yet."""
         rays_each = RAYS * self._effort
-        parts = [PatchRays(*(np.zeros((0, rays_each, size)) for size in (4, 3, 3)))]
+        nothing, no_color = np.zeros((0, rays_each, 4)), np.zeros((0, rays_each, 3))
+        parts = [PatchRays(nothing, no_color, no_color, np.zeros((0, rays_each), int))]
         ends = [np.zeros((0, rays_each), np.int64)]
         stop = 0
         for round_ in range(MOST_ROUNDS):
             start, stop = stop, self.patches.count
             if start == stop:
                 break
-            rays = self.trace(self.patches.points, np.arange(start, stop), rays_each)
+            rays = self.trace(self.patches.points, np.arange(start, stop), rays_each, sheets=self.patch_sheets)
             parts.append(rays)
-            ends.append(self._bind_ends(rays.hits, round_).reshape(-1, rays_each))
+            ends.append(self._bind_ends(rays, round_).reshape(-1, rays_each))
         self.light_new_patches()
         self._ends = np.concatenate(ends)
         self._brought = np.concatenate([rays.brought for rays in parts])
         self._reflected = np.concatenate([rays.reflected for rays in parts])
 
-    def _bind_ends(self, hits: np.ndarray, round_: int) -> np.ndarray:
-        hits = hits.reshape(-1, 4).astype(np.float32)
-        return self.patches.bind_ends(hits, round_, self._sees(hits))
+    def _bind_ends(self, rays: PatchRays, round_: int) -> np.ndarray:
+        hits = rays.hits.reshape(-1, 4).astype(np.float32)
+        return self.patches.bind_ends(hits, round_, self._sees(hits), rays.sheets.ravel())
 
     # Bounces
     # ------------------------------------------------------------------------------------------------------------------
@@ -264,15 +328,22 @@ class ReferenceLight:
             irradiance = bounce(self.direct, self._brought, self._reflected, self._ends, irradiance)
         return irradiance
 
-    def gather(self, hits: np.ndarray, rays_each: int, irradiance: np.ndarray, first_key: int) -> np.ndarray:
-        """(H, 3) irradiance of texels ``hits`` (H, 4) by light and paths of their own, the last segment of which ends
-        on patches of ``irradiance`` (N, 3)."""
+    def gather(
+        self,
+        hits: np.ndarray,
+        rays_each: int,
+        irradiance: np.ndarray,
+        first_key: int,
+        sheets: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """(H, 3) irradiance of texels ``hits`` (H, 4) on ``sheets`` (H,) by light and paths of their own, the last
+        segment of which ends on patches of ``irradiance`` (N, 3)."""
         points, numbers = hits[:, None].astype(np.float32), np.arange(len(hits))
         direct = np.zeros((len(hits), 3))
         lit = np.flatnonzero(hits[:, 3] >= 0)
-        direct[lit] = self.direct_light(points, lit, self.settings.samples, first_key)
-        rays = self.trace(points, numbers, rays_each, self.settings.gather, first_key)
-        ends = self._bind_ends(rays.hits, MOST_ROUNDS - 1).reshape(len(hits), -1)
+        direct[lit] = self.direct_light(points, lit, self.settings.samples, first_key, sheets=sheets)
+        rays = self.trace(points, numbers, rays_each, self.settings.gather, first_key, sheets)
+        ends = self._bind_ends(rays, MOST_ROUNDS - 1).reshape(len(hits), -1)
         return bounce(direct, rays.brought, rays.reflected, ends, irradiance)
 
 
@@ -293,6 +364,24 @@ def _split(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions and normals (C, 3 each) of places (C, 4), float64."""
     at = at.astype(float)
     return at[:, :3], unpack_normal(np.maximum(at[:, 3], 0.0))
+
+
+def off_surface(points: np.ndarray, directions: np.ndarray, distances: np.ndarray, sheets: np.ndarray) -> np.ndarray:
+    """Hit ``points`` (H, 3) as patches keep them: pulled back along their rays, but on the surface itself where that is
+    a sheet (H,), which rays leave on both sides."""
+    return np.where((sheets > 0)[:, None], points, pull_back(points, directions, distances))
+
+
+def _side_weight(through: np.ndarray, crosses: np.ndarray) -> np.ndarray:
+    """(C, 3) weight of rays of which half go on from the back of their sheet, those that cross it (C,), where it shows
+    the share ``through`` (C, 3) of its back; 1 for what is no sheet."""
+    share = np.where(crosses[:, None], through, 1 - through)
+    return np.where(through.any(axis=1, keepdims=True), 2 * share, 1.0)
+
+
+def _number(index: np.ndarray) -> np.ndarray:
+    """(C, 3) uint32 that adds ``index`` (C,) to the first component of keys."""
+    return np.stack([index, 0 * index, 0 * index], axis=1).astype(np.uint32)
 
 
 def _pack(normals: np.ndarray, surface: np.ndarray) -> np.ndarray:

@@ -13,7 +13,8 @@ import numpy as np
 from . import rays
 from .dithering import dither_threshold
 from .images import sample_image
-from .snapshot import DITHERED, NO_IMAGE, SceneSnapshot
+from .sheets import sheet_numbers
+from .snapshot import DIFFUSE_RAYS, DITHERED, NO_IMAGE, SHADOW_RAYS, SceneSnapshot
 
 
 @dataclass
@@ -37,17 +38,24 @@ class ReferenceScene:
         self.triangles = snapshot.triangle_positions - self.origin
         clips = np.array([material.alpha_threshold > 0 for material in snapshot.materials])
         self._clipped = clips[snapshot.material_index]
+        self._unseen_by = np.array([material.unseen_by for material in snapshot.materials])[snapshot.material_index]
+        sheet_of_material, self.sheet_shares = sheet_numbers(snapshot.materials)
+        self.sheet = sheet_of_material[snapshot.material_index]  # (T,) see core/sheets.py
 
     def closest(self, origins: np.ndarray, directions: np.ndarray) -> rays.Hits:
         """Nearest hits of rays ``origins``, ``directions`` (N, 3)."""
-        return rays.closest_hit(self.triangles, origins, directions, self._hole_test())
+        return rays.closest_hit(self.triangles, origins, directions, self._hole_test(DIFFUSE_RAYS))
 
     def visible(self, origins: np.ndarray, directions: np.ndarray, limits: np.ndarray) -> np.ndarray:
         """(N,) bool: does nothing lie on the rays nearer than ``limits`` (N,)?"""
-        return ~rays.any_hit(self.triangles, origins, directions, limits, self._hole_test())
+        return ~rays.any_hit(self.triangles, origins, directions, limits, self._hole_test(SHADOW_RAYS))
 
-    def _hole_test(self):
-        return self.is_hole if self._clipped.any() else None
+    def _hole_test(self, kind: int):
+        """What rays of a kind pass through; None for nothing."""
+        unseen = (self._unseen_by & kind) > 0
+        if not (unseen.any() or self._clipped.any()):
+            return None
+        return lambda triangle, barycentric: unseen[triangle] | self.is_hole(triangle, barycentric)
 
     def is_hole(self, triangle: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """(K,) bool: is the material of ``triangle`` (K,) clipped away at ``barycentric`` (K, 2)? Images at full

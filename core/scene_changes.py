@@ -30,12 +30,12 @@ _SURFACES = (
     "images",
 )
 _LIGHT_LABELS = {"name", "group", "dynamic"}  # say nothing about the light itself
-_LIGHT_SHADES = {"color", "spot_blend"}  # where these differ, shadows stay what they are
+_LIGHT_SHADES = {"color", "spot_blend", "profile"}  # where these differ, shadows stay what they are
 
 
 @dataclass(frozen=True)
 class ShapeChange:
-    """Triangles that moved, deformed, got other normals or other holes, came or left.
+    """Triangles that moved, deformed, got other normals, are seen by other rays, came or left.
 
     ``old_boxes`` (K, 2, 3) and ``new_boxes`` (K, 2, 3) are world-space corners (low, high), metres, which contain all
     such triangles before and after, K ≤ MOST_BOXES each. ``where`` (T,) bool are those of the newer snapshot.
@@ -126,6 +126,9 @@ def compare(old: SceneSnapshot, new: SceneSnapshot) -> SceneChanges:
     images = _image_map(old.images, new.images)
     before, after = _material_aspects(old.materials, None), _material_aspects(new.materials, images)
     differs = _triangles_differ(old, new, common, before, after)
+    shapes_differ = _shapes_differ(old, new, common)
+    for aspect in _REBUILDING:
+        shapes_differ = shapes_differ | differs[aspect]
     rows_differ = before != after
     images_differ = len(old.images) != len(new.images) or any(i != j for i, j in enumerate(images))
     numbers_differ = triangle_map is None and not np.array_equal(old.material_index, new.material_index)
@@ -138,7 +141,7 @@ def compare(old: SceneSnapshot, new: SceneSnapshot) -> SceneChanges:
         reflectance=bool(differs["reflectance"].any()),
         materials=rows_differ or images_differ or numbers_differ,
         images=images_differ,
-        shape=_shape_change(old, new, triangle_map, common, _shapes_differ(old, new, common) | differs["holes"]),
+        shape=_shape_change(old, new, triangle_map, common, shapes_differ),
     )
 
 
@@ -291,12 +294,21 @@ def _material_aspects(materials: list[Material], images: list[int] | None) -> li
             "holes": (m.alpha, m.alpha_threshold, image(m.alpha_image), m.alpha_from_color)
             if m.alpha_threshold > 0
             else (),
+            "visibility": m.unseen_by,
+            "sheets": m.transmitted if any(m.transmitted) else (),
         }
         for m in materials
     ]
 
 
-_ASPECT_IMAGES = {"reflectance": "base_image", "emission": "emission_image", "holes": "alpha_image"}
+_ASPECT_IMAGES = {
+    "reflectance": "base_image",
+    "emission": "emission_image",
+    "holes": "alpha_image",
+    "sheets": "base_image",
+    "visibility": None,
+}
+_REBUILDING = ("holes", "sheets", "visibility")  # where these differ, rays and patches find another surface
 
 
 def _triangles_differ(old, new, common, before: list[dict], after: list[dict]) -> dict[str, np.ndarray]:
@@ -312,7 +324,11 @@ def _triangles_differ(old, new, common, before: list[dict], after: list[dict]) -
             for rows in (before, after)
         )
         textured = np.array(
-            [row[aspect] != () and getattr(m, attribute) != NO_IMAGE for row, m in zip(after, new.materials)] or [False]
+            [
+                attribute is not None and row[aspect] != () and getattr(m, attribute) != NO_IMAGE
+                for row, m in zip(after, new.materials)
+            ]
+            or [False]
         )
         result[aspect] = (old_value[old_index] != new_value[new_index]) | (uvs & textured[new_index])
     return result

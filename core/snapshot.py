@@ -13,8 +13,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .camera import Camera
+from .light_profiles import LightProfile
 
 NO_IMAGE = -1
+SHADOW_RAYS, DIFFUSE_RAYS = 1, 2  # kinds of rays that may not see a surface
 DITHERED = 2.0  # an ``alpha_threshold`` above what alpha can be: every place has one of its own, by chance
 
 
@@ -39,7 +41,8 @@ class Material:
     The reflected part is ``base_color × base texture × diffuse_share``: ``diffuse_share`` is what is left after
     metallic, transmission and mix weights took theirs. Emission is ``emission × emission texture`` and is
     radiance. A texel with alpha below ``alpha_threshold`` is a hole (0: no clip; DITHERED: with the chance 1 − alpha,
-    see ``core.dithering``).
+    see ``core.dithering``). Of the part that is sent back the share ``transmitted``, per channel, leaves on the other
+    side than that where the light arrived (see ``core.sheets``).
     """
 
     name: str
@@ -52,6 +55,8 @@ class Material:
     alpha_from_color: bool = False  # the alpha input was fed by the colour output: use its mean
     alpha: float = 1.0
     alpha_threshold: float = 0.0
+    transmitted: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    unseen_by: int = 0  # sum of SHADOW_RAYS and DIFFUSE_RAYS: for these the surface is not there
     backface_culling: bool = False  # stated only; light transport treats every surface as two-sided, like Cycles
 
 
@@ -90,6 +95,7 @@ class Light:
     casts_shadow: bool = True
     dynamic: bool = False  # animated or marked dynamic: its direct light is not kept
     group: str = ""  # role in Explore mode and in reports
+    profile: LightProfile | None = None  # what nodes make of its light; not of suns
 
 
 @dataclass(frozen=True)

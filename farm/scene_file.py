@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.camera import Camera
+from ..core.light_profiles import LightProfile
 from ..core.snapshot import Image, Light, Material, SceneSnapshot, World
 from . import container
 
@@ -62,9 +63,7 @@ class SceneReader:
             object_names=document["object_names"],
             materials=[Material(**_tuples(material)) for material in document["materials"]],
             images=images,
-            lights=[
-                Light(**_tuples({**light, "matrix": np.array(light["matrix"], float)})) for light in document["lights"]
-            ],
+            lights=[_light(light) for light in document["lights"]],
             world=World(tuple(world["color"]), None if world["map"] is None else self._array(world["map"], before)),
             camera=None if document["camera"] is None else Camera(**_arrays(document["camera"])),
             exposure=document["exposure"],
@@ -98,6 +97,11 @@ def _plain(value):
     if isinstance(value, np.generic):
         return value.item()
     return value
+
+
+def _light(values: dict) -> Light:
+    profile = values["profile"] and LightProfile(**_arrays(values["profile"]))
+    return Light(**_tuples({**values, "matrix": np.array(values["matrix"], float), "profile": profile}))
 
 
 def _tuples(values: dict) -> dict:

@@ -25,6 +25,7 @@ from ..core.snapshot import SceneSnapshot
 from ..core.steps import Pace, Steps
 from .gradient_pass import GradientPass
 from .patch_light import PatchLight
+from .places import Places
 from .programs import program
 from .raster_capture import RasterCapture
 from .scene_textures import SceneTextures
@@ -268,23 +269,29 @@ class GpuBackend:
 
     def _bind_portion(self, surfaces: Surfaces, start: int, count: int) -> None:
         first = surfaces.first + start
-        hits = self._texel_hits(surfaces, start, count)
-        patches = self.light.patches.bind_texels(hits, self.face, self.probe_slots, first, count)
+        texels = self._texel_hits(surfaces, start, count)
+        patches = self.light.patches.bind_texels(texels, self.face, self.probe_slots, first, count)
         shader = program("texel_patches_comp", FACE=self.face)
         shader.uniform_sampler("patches", patches)
         shader.image("albedo", surfaces.textures["albedo"])
         shader.uniform_int("first_layer", (start,))
         self._dispatch_texels(shader, count)
 
-    def _texel_hits(self, surfaces: Surfaces, start: int, count: int) -> gpu.types.GPUTexture:
+    def _texel_hits(self, surfaces: Surfaces, start: int, count: int) -> Places:
         """Where texels meet surface, as one linear array."""
-        shader = program("texel_hits_comp", FACE=self.face)
-        hits = scratch(count * 6 * self.face**2, "texels")
+        shader = program("texel_hits_comp", FACE=self.face, **self.scene.sheet_defines)
+        texels = count * 6 * self.face**2
+        hits = Places(
+            scratch(texels, "texels"), 1, scratch(texels, "texels", "R32F") if self.scene.has_sheets else None
+        )
+        self.scene.bind_sheets(shader)
+        if hits.sheets is not None:
+            shader.image("hit_sheets", hits.sheets)
         shader.uniform_sampler("probe_slots", self.probe_slots)
         self.scene.bind(shader, "triangle_corners")
         for name in ("geometry", "albedo"):
             shader.uniform_sampler(name, surfaces.textures[name])
-        shader.image("hits", hits)
+        shader.image("hits", hits.points)
         shader.uniform_int("first_slot", (surfaces.first + start,))
         shader.uniform_int("first_layer", (start,))
         self._dispatch_texels(shader, count)

@@ -44,6 +44,15 @@ def _scene(info, defines: dict, first: int = 0, attributes: bool = True) -> int:
     return _samplers(info, *names, first=first)
 
 
+def _sheets(info, defines: dict, first: int, *arrays: str) -> int:
+    """Shares of sheets, and ``arrays`` with numbers of them, where the scene has sheets."""
+    return _samplers(info, "sheets", *arrays, first=first) if "HAS_SHEETS" in defines else first
+
+
+def _sheet_files(defines: dict) -> list[str]:
+    return ["sheet_lib"] if "HAS_SHEETS" in defines else []
+
+
 def _lookup(info, first: int) -> int:
     info.define("DEPTH_EDGE", str(DEPTH_EDGE))
     info.define("LEAST_WEIGHT", repr(LEAST_WEIGHT))
@@ -214,11 +223,15 @@ def sun_project_comp(info, defines):
 def texel_hits_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
     slot = _samplers(info, "probe_slots", "triangle_corners")
-    _samplers(info, "geometry", "albedo", kind="FLOAT_2D_ARRAY", first=slot)
+    slot = _samplers(info, "geometry", "albedo", kind="FLOAT_2D_ARRAY", first=slot)
+    _sheets(info, defines, slot)
     _image(info, 0, "hits")
+    if "HAS_SHEETS" in defines:
+        _image(info, 1, "hit_sheets", pixel="R32F")
     _ints(info, "first_slot", "first_layer")
     info.local_group_size(8, 8, 1)
-    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", "offset_lib", "texel_hits_comp"]}
+    files = ["data_lib", "octahedral_lib", "cubemap_lib", "offset_lib", *_sheet_files(defines), "texel_hits_comp"]
+    return {"compute": files}
 
 
 def texel_patches_comp(info, defines):
@@ -232,12 +245,14 @@ def texel_patches_comp(info, defines):
 def patch_spread_comp(info, defines):
     slot = _scene(info, defines, attributes="HAS_EMITTERS" in defines)
     slot = _emitters(info, defines, slot)
-    _samplers(info, "lights", "patch_points", first=slot)
+    slot = _samplers(info, "lights", "patch_points", first=slot)
+    _sheets(info, defines, slot, "sheet_numbers")
     _image(info, 0, "spread", pixel="RG32F")
     _ints(info, "first_patch", "patch_count", "first_light", "light_count", "seed")
     info.define("FIRST_LIGHT", "first_light")
     info.local_group_size(64, 1, 1)
-    return {"compute": ["data_lib", "octahedral_lib", *_light_files(defines), "patch_spread_comp"]}
+    files = ["data_lib", "octahedral_lib", *_light_files(defines), *_sheet_files(defines), "patch_spread_comp"]
+    return {"compute": files}
 
 
 def _patch_lists(info) -> None:
@@ -249,13 +264,15 @@ def _patch_lists(info) -> None:
 def patch_direct_comp(info, defines):
     slot = _scene(info, defines, attributes="HAS_EMITTERS" in defines)
     slot = _emitters(info, defines, slot)
-    _samplers(info, "lights", "patches", "patch_points", first=slot)
+    slot = _samplers(info, "lights", "patches", "patch_points", first=slot)
+    _sheets(info, defines, slot, "sheet_numbers")
     _image(info, 0, "sums")
     _patch_lists(info)
     _ints(info, "first_key", "first_light", "light_count", "seed")
     info.define("FIRST_LIGHT", "first_light")
     info.local_group_size(64, 1, 1)
-    return {"compute": ["data_lib", "octahedral_lib", *_light_files(defines), "patch_lists_lib", "patch_direct_comp"]}
+    files = ["data_lib", "octahedral_lib", *_light_files(defines), *_sheet_files(defines)]
+    return {"compute": [*files, "patch_lists_lib", "patch_direct_comp"]}
 
 
 def patch_mean_comp(info, defines):
@@ -274,10 +291,13 @@ def patch_rays_comp(info, defines):
         slot = _emitters(info, defines, slot)
         _ints(info, "light_count")
         slot = _samplers(info, "lights", first=slot)
-    _samplers(info, "patch_points", "world_texels", first=slot)
+    slot = _samplers(info, "patch_points", "world_texels", first=slot)
+    _sheets(info, defines, slot, "sheet_numbers")
     _image(info, 0, "hits")
     _image(info, 1, "carried")
     _image(info, 2, "reflected")
+    if "HAS_SHEETS" in defines:
+        _image(info, 3, "hit_sheets", pixel="R32F")
     _ints(info, "first_ray", "ray_count", "rays_each", "first_key", "seed")
     info.local_group_size(64, 1, 1)
     return {
@@ -290,6 +310,7 @@ def patch_rays_comp(info, defines):
                 if is_path
                 else ("random_lib", "surface_lib", "offset_lib", "ray_lib")
             ),
+            *_sheet_files(defines),
             "patch_rays_comp",
         ]
     }

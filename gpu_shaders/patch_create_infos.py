@@ -20,6 +20,8 @@ def _linear(info, *files: str) -> dict:
 
 def patch_keys_comp(info, defines):
     slot = _samplers(info, "hits", "cell_rule")
+    if "HAS_SHEETS" in defines:
+        slot = _samplers(info, "hit_sheets", first=slot)
     if "HAS_VIEW" in defines:
         _samplers(info, "probe_slots", first=slot)
         _ints(info, "first_slot")
@@ -85,6 +87,8 @@ def patch_number_comp(info, defines):
     _image(info, image, "total_out", pixel="R32F")
     _image(info, image + 1, "patch_keys")
     _image(info, image + 2, "patch_points")
+    if "HAS_SHEETS" in defines:
+        _image(info, image + 3, "patch_sheets", pixel="R32F")
     _ints(info, "variant")
     return _compaction(info, *_PENDING_FILES, "compaction_lib", "patch_number_comp")
 

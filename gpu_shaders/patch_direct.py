@@ -10,11 +10,12 @@ from __future__ import annotations
 import gpu
 import numpy as np
 
-from ..core.patches import ALL, EMITTERS, POINTS, SAMPLES, Part, light_parts
+from ..core.patches import ALL, EMITTERS, SAMPLES, Part, light_parts
 from ..core.settings import BakeSettings
 from ..core.steps import Pace, Steps
 from .dispatch import COMPACTION_BLOCK, dispatch_linear
 from .growing_array import GrowingArray, Scratch, fill_elements
+from .places import Places
 from .programs import program
 from .scene_textures import SceneTextures
 from .textures import read
@@ -65,18 +66,18 @@ class PatchDirect:
     def texture(self) -> gpu.types.GPUTexture:
         return self._total.texture
 
-    def add(self, points: gpu.types.GPUTexture, count: int) -> Steps[None]:
-        """Lights those of ``count`` patches with ``points`` (see PatchFinder) that are not lit yet, in steps."""
+    def add(self, places: Places, count: int) -> Steps[None]:
+        """Lights those of ``count`` patches at ``places`` that are not lit yet, in steps."""
         fresh = (self.count, count)
         self._together.append(fresh)
         for part in self._wanted_parts():
             light = self._parts.setdefault(part, _PartLight())
             light.grow(*fresh)
-            self.find_spread(part, points, *fresh, light.spread.texture)
+            self.find_spread(part, places, *fresh, light.spread.texture)
             yield
-        yield from self._light_what_is_due(points)
+        yield from self._light_what_is_due(places)
 
-    def again(self, points: gpu.types.GPUTexture, changed: np.ndarray, emitters: bool) -> Steps[int]:
+    def again(self, places: Places, changed: np.ndarray, emitters: bool) -> Steps[int]:
         """Direct light where lamps ``changed`` (lamp_count,) bool, or all sampled ``emitters``, or came or left, in
         steps.
 
@@ -90,10 +91,10 @@ class PatchDirect:
                 continue
             light = self._parts[part] = before.get(part) or _PartLight()
             light.grow(0, self.count)
-            self.find_spread(part, points, 0, self.count, light.spread.texture)
+            self.find_spread(part, places, 0, self.count, light.spread.texture)
             lamps += part[1] - part[0] if isinstance(part, tuple) else 0
             yield
-        yield from self._light_what_is_due(points)
+        yield from self._light_what_is_due(places)
         return lamps
 
     def _wanted_parts(self) -> list[Part]:
@@ -102,7 +103,7 @@ class PatchDirect:
     # How many samples
     # ------------------------------------------------------------------------------------------------------------------
 
-    def _light_what_is_due(self, points: gpu.types.GPUTexture) -> Steps[None]:
+    def _light_what_is_due(self, places: Places) -> Steps[None]:
         """Patches that were not lit, or with another number of samples than they should have."""
         if not self._parts:
             self._add_up()
@@ -116,7 +117,7 @@ class PatchDirect:
                 (index * self.count, number, samples * self.effort)
                 for index, (number, samples) in enumerate(zip(numbers, SAMPLES))
             ]
-            yield from self.light(points, POINTS, due, entries, light.values.texture, part=part)
+            yield from self.light(places, due, entries, light.values.texture, part=part)
         self._add_up()
 
     def _lights_together(self) -> gpu.types.GPUTexture:
@@ -162,12 +163,11 @@ class PatchDirect:
             total.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
         add_patches(total, self.count, [light.values.texture for light in self._parts.values()])
 
-    def find_spread(self, part: Part, points: gpu.types.GPUTexture, first: int, stop: int, spread) -> None:
+    def find_spread(self, part: Part, places: Places, first: int, stop: int, spread) -> None:
         """Mean and standard deviation of the luminance at the points of patches ``first`` .. ``stop`` if nothing stands
         between, into ``spread`` (RG32F)."""
-        shader = program("patch_spread_comp", POINTS=POINTS, **self._defines(part))
-        self._bind(shader, part)
-        shader.uniform_sampler("patch_points", points)
+        shader = program("patch_spread_comp", POINTS=places.each, **self._defines(part))
+        self._bind(shader, part, places)
         shader.image("spread", spread)
         for name, value in (("first_patch", first), ("patch_count", stop - first), ("seed", self._settings.seed)):
             shader.uniform_int(name, (value,))
@@ -178,16 +178,15 @@ class PatchDirect:
 
     def light(
         self,
-        points,
-        points_each: int,
+        places: Places,
         chosen,
         lists: list[_List],
         target,
         first_key: int = 0,
         part: Part = ALL,
     ) -> Steps[None]:
-        """Direct light by ``part`` of the patches or texels in ``lists`` of ``chosen``, with ``points_each`` places in
-        ``points``, into ``target``; in steps."""
+        """Direct light by ``part`` of the patches or texels in ``lists`` of ``chosen``, at their ``places``, into
+        ``target``; in steps."""
         work = sum(count * samples for _first, count, samples in lists)
         for begins, portion in enumerate(self._portions(part)):
             lamps = portion[1] - portion[0] if isinstance(portion, tuple) else 1
@@ -195,7 +194,7 @@ class PatchDirect:
 
             def light(start: int, number: int, portion=portion, samples_each=samples_each, begins=begins == 0) -> None:
                 some = _cut(lists, start, start + number)
-                self._light_portion(portion, points, points_each, chosen, some, samples_each, target, first_key, begins)
+                self._light_portion(portion, places, chosen, some, samples_each, target, first_key, begins)
 
             yield from self._pace.portions("direct", work, light, 4096, _SAMPLES_AT_ONCE)
 
@@ -210,8 +209,7 @@ class PatchDirect:
     def _light_portion(
         self,
         part: Part,
-        points,
-        points_each: int,
+        places: Places,
         chosen,
         lists: list[_List],
         samples_each: int,
@@ -224,9 +222,8 @@ class PatchDirect:
             return
         threads = sum(count * -(-samples // samples_each) for _first, count, samples in lists)
         sums = self.scratch("sums", threads, "samples")
-        shader = program("patch_direct_comp", POINTS=points_each, SAMPLES_EACH=samples_each, **self._defines(part))
-        self._bind(shader, part)
-        shader.uniform_sampler("patch_points", points)
+        shader = program("patch_direct_comp", POINTS=places.each, SAMPLES_EACH=samples_each, **self._defines(part))
+        self._bind(shader, part, places)
         shader.image("sums", sums)
         shader.uniform_int("first_key", (first_key,))
         shader.uniform_int("seed", (self._settings.seed,))
@@ -240,13 +237,16 @@ class PatchDirect:
         dispatch_linear(shader, entries)
 
     def _defines(self, part: Part) -> dict:
-        return self._scene.light_defines if part == EMITTERS else self._scene.ray_defines
+        defines = self._scene.light_defines if part == EMITTERS else self._scene.ray_defines
+        return defines | self._scene.sheet_defines
 
-    def _bind(self, shader, part: Part) -> None:
+    def _bind(self, shader, part: Part, places: Places) -> None:
         (self._scene.bind_lights if part == EMITTERS else self._scene.bind_lamps)(shader)
         first, stop = part if isinstance(part, tuple) else (0, 0)
         shader.uniform_int("first_light", (first,))
         shader.uniform_int("light_count", (stop,))
+        shader.uniform_sampler("patch_points", places.points)
+        self._scene.bind_sheets(shader, places.sheets)
 
 
 def reduce_patches(values, first: int, stop: int, results, result: int, others=None) -> None:

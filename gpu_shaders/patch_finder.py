@@ -21,6 +21,7 @@ from ..core.grid import Grid
 from ..core.patches import MOST_ROUNDS, NO_PATCH, NOTHING, POINTS, VARIANTS, CellRule, coarser_by
 from .dispatch import COMPACTION_BLOCK, dispatch_linear
 from .growing_array import GrowingArray
+from .places import Places
 from .programs import program
 from .scene_textures import SceneTextures
 from .textures import allocate_integers, read, scratch, upload
@@ -43,6 +44,7 @@ class PatchFinder:
         self._keys = GrowingArray("patches")
         self._points = GrowingArray("patches")
         self._seen = GrowingArray("patches", "R32F", fill=0)
+        self._sheets = GrowingArray("patches", "R32F", fill=0)
         self._candidates = GrowingArray("patches", "R32UI", fill=_NOBODY)
         self._places = 0
         self._totals = [gpu.types.GPUTexture((1, 1), format="R32F") for _ in range(2)]
@@ -53,6 +55,11 @@ class PatchFinder:
     @property
     def points(self) -> gpu.types.GPUTexture:
         return self._points.texture
+
+    @property
+    def places(self) -> Places:
+        """The points with what lighting them asks for."""
+        return Places(self.points, POINTS, self._sheets.texture if self._scene.has_sheets else None)
 
     @property
     def seen(self) -> gpu.types.GPUTexture:
@@ -69,11 +76,11 @@ class PatchFinder:
     # Binding
     # ------------------------------------------------------------------------------------------------------------------
 
-    def bind_texels(self, hits, face: int, probe_slots, first_slot: int, probes: int) -> gpu.types.GPUTexture:
-        """Patches of the texels of ``probes`` probes, which stand in slots from ``first_slot`` on: one number an
-        element, NO_PATCH where a texel sees nothing to light. ``hits`` as texel_hits_comp writes them."""
-        texels = 6 * face**2
-        bind = _Bind(hits, probes * texels, face, {"HAS_VIEW": True, "TEXELS": texels})
+    def bind_texels(self, texels: Places, face: int, probe_slots, first_slot: int, probes: int) -> gpu.types.GPUTexture:
+        """Patches of the ``texels`` of ``probes`` probes, which stand in slots from ``first_slot`` on: one number an
+        element, NO_PATCH where a texel sees nothing to light."""
+        count = 6 * face**2
+        bind = _Bind(texels, probes * count, face, {"HAS_VIEW": True, "TEXELS": count})
         shader = self._keys_shader(bind, NO_PATCH)
         shader.uniform_sampler("probe_slots", probe_slots)
         shader.uniform_int("first_slot", (first_slot,))
@@ -81,9 +88,9 @@ class PatchFinder:
         self._join_all(bind, found=True)
         return bind.bound
 
-    def bind_ends(self, hits: gpu.types.GPUTexture, count: int, round_: int) -> gpu.types.GPUTexture:
-        """Patches on which ``count`` rays of a round end, NOTHING where no light comes back. What only rays see gets
-        the coarser patches the more rays it takes to see it, in the last round none."""
+    def bind_ends(self, hits: Places, count: int, round_: int) -> gpu.types.GPUTexture:
+        """Patches on which ``count`` rays of a round end at ``hits``, NOTHING where no light comes back. What only
+        rays see gets the coarser patches the more rays it takes to see it, in the last round none."""
         bind = _Bind(hits, count, 4, {})
         dispatch_linear(self._keys_shader(bind, NOTHING), count)
         self._join_all(bind, found=round_ == 0)
@@ -93,8 +100,10 @@ class PatchFinder:
         return bind.bound
 
     def _keys_shader(self, bind: _Bind, without_surface: int, coarser: int = 0, only_lost: bool = False):
-        shader = program("patch_keys_comp", **bind.view)
+        shader = program("patch_keys_comp", **bind.view, HAS_SHEETS=bind.sheets is not None)
         shader.uniform_sampler("hits", bind.hits)
+        if bind.sheets is not None:
+            shader.uniform_sampler("hit_sheets", bind.sheets)
         shader.uniform_sampler("cell_rule", self._rule)
         shader.image("hit_keys", bind.keys)
         shader.image("bound", bind.bound)
@@ -155,7 +164,10 @@ class PatchFinder:
             blocks = -(-entries // COMPACTION_BLOCK)
             self._most = _number_in(self._totals[0]) + int(read(counts, blocks, channels=1).sum())
         self._reserve(self._most)
-        shader = self._compaction("patch_number_comp", bind, items, item_count, leaders=True)
+        sheets = bind.sheets is not None
+        shader = self._compaction("patch_number_comp", bind, items, item_count, leaders=True, HAS_SHEETS=sheets)
+        if sheets:
+            shader.image("patch_sheets", self._sheets.texture)
         for name, texture in (
             ("block_counts", counts),
             ("total_in", self._totals[0]),
@@ -221,8 +233,8 @@ class PatchFinder:
         gpu.compute.dispatch(shader, blocks, 1, 1)
         return counts
 
-    def _compaction(self, name: str, bind: _Bind, items, item_count: int, leaders: bool = False):
-        shader = program(name, LEADERS=leaders)
+    def _compaction(self, name: str, bind: _Bind, items, item_count: int, leaders: bool = False, **defines):
+        shader = program(name, LEADERS=leaders, **defines)
         shader.uniform_sampler("items", items)
         shader.uniform_sampler("bound", bind.bound)
         if leaders:
@@ -248,6 +260,8 @@ class PatchFinder:
     def _reserve(self, patches: int) -> None:
         self._keys.reserve(patches)
         self._seen.reserve(patches)
+        if self._scene.has_sheets:
+            self._sheets.reserve(patches)
         self._points.reserve(patches * POINTS)
         self._candidates.reserve(patches * POINTS)
 
@@ -272,9 +286,10 @@ class PatchFinder:
 class _Bind:
     """Hits that ask for patches, and what is noted of each."""
 
-    def __init__(self, hits: gpu.types.GPUTexture, count: int, row_length: int, view: dict):
+    def __init__(self, hits: Places, count: int, row_length: int, view: dict):
         """``row_length``: hits in a row, whose neighbours lie side by side; ``view``: defines of texels."""
-        self.hits, self.count, self.row_length, self.view = hits, count, row_length, view
+        self.hits, self.sheets = hits.points, hits.sheets
+        self.count, self.row_length, self.view = count, row_length, view
         self.keys = scratch(count, "hits")
         self.slots = scratch(count, "hits", "R32F")
         self.bound = scratch(count, "hits", "R32F")

@@ -15,13 +15,14 @@ import numpy as np
 
 from ..core.extrapolation import STATES, reduced_rank
 from ..core.grid import Grid
-from ..core.patches import MOST_ROUNDS, POINTS, RAYS, effort, gather_rays
+from ..core.patches import MOST_ROUNDS, RAYS, effort, gather_rays
 from ..core.settings import BakeSettings
 from ..core.steps import Pace, Steps, run
 from .dispatch import dispatch_linear
 from .growing_array import GrowingArray, copy_elements
 from .patch_direct import PatchDirect, reduce_patches
 from .patch_finder import PatchFinder
+from .places import Places
 from .programs import program
 from .scene_textures import SceneTextures
 from .textures import allocate, numbers, read, scratch, upload
@@ -35,7 +36,7 @@ class _Rays:
     """Where ``count`` rays end, see patch_rays_comp.glsl."""
 
     count: int
-    hits: gpu.types.GPUTexture
+    hits: Places
 
 
 class PatchLight:
@@ -67,13 +68,13 @@ class PatchLight:
             return
         if self._direct.count == 0:
             self._direct.effort = effort(self.count, self._settings.samples)
-        yield from self._direct.add(self.patches.points, self.count)
+        yield from self._direct.add(self.patches.places, self.count)
         self._brightest = None
 
     def light_again(self, changed: np.ndarray, emitters: bool) -> Steps[int]:
         """Direct light of all patches where lamps ``changed`` (lamp_count,) bool, or sampled ``emitters`` did, in
         steps. Returns the number of lamps that were computed."""
-        lamps = yield from self._direct.again(self.patches.points, changed, emitters)
+        lamps = yield from self._direct.again(self.patches.places, changed, emitters)
         self._brightest = None
         return lamps
 
@@ -128,13 +129,12 @@ class PatchLight:
         reflected, brought = self._reflected.reserve(stop * self._rays_each), self._brought.reserve(stop)
         for first in range(start, stop, at_once):
             count = min(stop - first, at_once)
-            rays = self._trace(self.patches.points, POINTS, first, count, self._rays_each, reflected, brought)
+            rays = self._trace(self.patches.places, first, count, self._rays_each, reflected, brought)
             yield first * self._rays_each, rays
 
     def _trace(
         self,
-        points,
-        points_each: int,
+        places: Places,
         first: int,
         count: int,
         rays_each: int,
@@ -143,23 +143,30 @@ class PatchLight:
         segments=1,
         first_key=0,
     ) -> _Rays:
-        """``rays_each`` rays of each of ``count`` patches from ``first``, with ``points_each`` places in ``points``.
+        """``rays_each`` rays of each of ``count`` patches or texels from ``first`` on of ``places``.
+
         What they reflect and bring along goes into arrays of all rays and of all patches."""
         rays = count * rays_each
         hits, carried = (scratch(rays, "rays") for _ in range(2))
+        sheets = scratch(rays, "rays", "R32F") if self._scene.has_sheets else None
         is_path = segments > 1
-        defines = self._scene.surface_defines | (self._scene.light_defines if is_path else {})
+        defines = (
+            self._scene.surface_defines | (self._scene.light_defines if is_path else {}) | self._scene.sheet_defines
+        )
         shader = program(
             "patch_rays_comp",
             FACE=self._settings.face,
-            POINTS=points_each,
+            POINTS=places.each,
             SEGMENTS=segments,
             **(defines | {"HAS_IMAGES": self._scene.has_images}),
         )
         self._scene.bind_surfaces(shader)
         if is_path:
             self._scene.bind_lights(shader)
-        shader.uniform_sampler("patch_points", points)
+        self._scene.bind_sheets(shader, places.sheets)
+        if sheets is not None:
+            shader.image("hit_sheets", sheets)
+        shader.uniform_sampler("patch_points", places.points)
         shader.uniform_sampler("world_texels", self.world_texels)
         for name, texture in (("hits", hits), ("carried", carried), ("reflected", reflected)):
             shader.image(name, texture)
@@ -179,7 +186,7 @@ class PatchLight:
         shader.uniform_int("patch_count", (count,))
         shader.uniform_int("rays_each", (rays_each,))
         dispatch_linear(shader, count)
-        return _Rays(rays, hits)
+        return _Rays(rays, Places(hits, 1, sheets))
 
     # Bounces
     # ------------------------------------------------------------------------------------------------------------------
@@ -264,17 +271,17 @@ class PatchLight:
     # Final gather
     # ------------------------------------------------------------------------------------------------------------------
 
-    def gather(self, hits: gpu.types.GPUTexture, count: int, first_key: int) -> gpu.types.GPUTexture:
-        """Irradiance of ``count`` texels by light and paths of their own instead of their patches': ``hits`` as
-        texel_hits_comp writes them, ``first_key`` the number of the first texel among all."""
+    def gather(self, texels: Places, count: int, first_key: int) -> gpu.types.GPUTexture:
+        """Irradiance of ``count`` ``texels`` by light and paths of their own instead of their patches'; ``first_key``:
+        the number of the first texel among all."""
         settings = self._settings
         rays_each = gather_rays(settings.samples)
         direct, result = allocate(count, "texels"), allocate(count, "texels")
-        reflects = np.flatnonzero(read(hits, count)[:, 3] >= 0)
+        reflects = np.flatnonzero(read(texels.points, count)[:, 3] >= 0)
         chosen = numbers(reflects, "texels")
-        run(self._direct.light(hits, 1, chosen, [(0, len(reflects), settings.samples)], direct, first_key))
+        run(self._direct.light(texels, chosen, [(0, len(reflects), settings.samples)], direct, first_key))
         reflected, brought = scratch(count * rays_each, "rays"), scratch(count, "texels")
-        rays = self._trace(hits, 1, 0, count, rays_each, reflected, brought, settings.gather, first_key)
+        rays = self._trace(texels, 0, count, rays_each, reflected, brought, settings.gather, first_key)
         ends = self.patches.bind_ends(rays.hits, rays.count, MOST_ROUNDS - 1)
         self._bounce(direct, brought, reflected, ends, rays_each, count, result)
         return result

@@ -55,6 +55,7 @@ class PreviewPass:
             FACE=BACKGROUND_FACE,
             **(field.defines if field else NO_FIELD),
             **self._scene.surface_defines,
+            **self._scene.sheet_defines,
         )
         pictures = [gpu.types.GPUTexture((width, height), format="RGBA32F") for _ in range(2)]
         view = View.from_camera(camera, 0.01, 1000.0).relative_to(self._origin)
@@ -68,6 +69,7 @@ class PreviewPass:
                 return None
             self._scene.bind_surfaces(shader)
             self._scene.bind(shader, "lights")
+            self._scene.bind_sheets(shader)
             if field:
                 field.bind(shader)
             shader.uniform_sampler("world_texels", self._background)

@@ -52,11 +52,12 @@ class ProbePaths:
 
     def _trace(self, first: int, count: int, bounces: int | None, seed: int) -> tuple[np.ndarray, np.ndarray]:
         scene, paths = self._scene, self.count * count
-        defines = scene.surface_defines | scene.light_defines | {"HAS_IMAGES": scene.has_images}
+        defines = scene.surface_defines | scene.light_defines | scene.sheet_defines | {"HAS_IMAGES": scene.has_images}
         shader = program("probe_paths_comp", FACE=_FACE, **defines)
         directions, flux = (allocate(_PARTS * paths, "paths") for _ in range(2))
         scene.bind_surfaces(shader)
         scene.bind_lights(shader)
+        scene.bind_sheets(shader)
         shader.uniform_sampler("probe_points", self._points)
         shader.uniform_sampler("world_texels", self._world)
         shader.image("directions", directions)

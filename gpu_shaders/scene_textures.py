@@ -13,6 +13,7 @@ import numpy as np
 from ..core import bvh, emitters
 from ..core.errors import InputError
 from ..core.scene_changes import SceneChanges, ShapeChange, boxes_around
+from ..core.sheets import sheet_numbers
 from ..core.snapshot import Light, SceneSnapshot
 from ..core.steps import Pace, Steps, run
 from .image_textures import send_images
@@ -96,13 +97,25 @@ class SceneTextures:
         """Other lamps for the same surfaces."""
         self.light_count = len(lights)
         self._lights = pack_lights(lights, origin)
-        self._textures["lights"] = upload(np.concatenate([self._lights, self._suns]), "lights")
+        self._profiles = [light.profile for light in lights]
+        self._send_lights()
 
     def set_suns(self, suns: list[Light]) -> None:
         """Suns of the world, which light patches like lamps. They follow the lamps, so that pictures, which see the
         world through the field, count lamps only."""
         self._suns = pack_lights(suns, np.zeros(3))
-        self._textures["lights"] = upload(np.concatenate([self._lights, self._suns]), "lights")
+        self._send_lights()
+
+    def _send_lights(self) -> None:
+        """Lamps, suns, and what nodes make of lamps' light."""
+        rows = np.concatenate([self._lights, self._suns])
+        parts, end = [rows.reshape(-1, 4)], 6 * len(rows)
+        for row, profile in zip(rows, self._profiles):
+            if profile is not None:
+                row[5, 3] = end
+                parts.append(profile.rows())
+                end += len(parts[-1])
+        self._textures["lights"] = upload(np.concatenate(parts), "lights")
 
     def _build(self, snapshot: SceneSnapshot) -> None:
         corners = (snapshot.triangle_positions - self._origin).astype(np.float32)
@@ -132,20 +145,23 @@ class SceneTextures:
         return "rebuilt"
 
     def _send_surfaces(self, snapshot: SceneSnapshot, density: np.ndarray, only: np.ndarray | None = None) -> None:
-        """Materials, emitters, and corners and attributes of all triangles or of those at ``only`` (K,) in leaf
+        """Materials, sheets, emitters, and corners and attributes of all triangles or of those at ``only`` (K,) in leaf
         order."""
         for name, values in self._surface_rows(snapshot, density, slice(None) if only is None else only).items():
-            if only is None or name in ("materials", "emitters"):
+            if only is None or name in ("materials", "sheets", "emitters"):
                 self._textures[name] = upload(values, name.replace("_", " "))
             elif len(only):
                 scatter_rows(self._textures[name], only, values)
 
     def _surface_rows(self, snapshot: SceneSnapshot, density: np.ndarray, at) -> dict[str, np.ndarray]:
-        """Textures' contents by name: materials, emitters, and corners and attributes of the triangles ``at`` in leaf
-        order. Notes what of it decides about shaders."""
+        """Textures' contents by name: materials, sheets, emitters, and corners and attributes of the triangles ``at``
+        in leaf order. Notes what of it decides about shaders."""
         order = self.hierarchy.order
         clips = np.array([m.alpha_threshold > 0 for m in snapshot.materials] or [False])
-        self.has_alpha = bool(clips.any())
+        unseen = np.array([m.unseen_by for m in snapshot.materials] or [0])
+        self.has_alpha, self.has_unseen = bool(clips.any()), bool(unseen.any())
+        sheet_of_material, shares = sheet_numbers(snapshot.materials)
+        self.has_sheets = len(shares) > 1
         self._density = density[order]
         self.emitter_count = int(np.count_nonzero(self._density))
         self.emitter_reach = emitters.reach(self._density)
@@ -154,9 +170,11 @@ class SceneTextures:
         rows = np.zeros((len(corners), 3, 4), np.float32)
         rows[:, :, :3] = corners
         rows[:, 0, 3] = self.hierarchy.leaf_end[at]
-        rows[:, 1, 3] = clips[material]
+        rows[:, 1, 3] = clips[material] + 2 * unseen[material]  # bits, see ray_lib
+        rows[:, 2, 3] = sheet_of_material[material]
         return {
             "materials": _materials(snapshot),
+            "sheets": np.pad(shares, ((0, 0), (0, 1))).astype(np.float32),
             "emitters": _emitters(self._density, self.corners, order),
             "triangle_corners": rows,
             "triangle_attributes": _attributes(snapshot, order[at], material, corners, self._density[at]),
@@ -174,6 +192,7 @@ class SceneTextures:
         return {
             "HAS_ALPHA": self.has_alpha,
             "HAS_IMAGES": self.has_images,
+            "HAS_UNSEEN": self.has_unseen,
             "STACK_SIZE": stack_size,
             "LEAN_STACK": gpu.platform.device_type_get() != "SOFTWARE",
         }
@@ -188,6 +207,18 @@ class SceneTextures:
         """For shaders that light points: sampled emitters bring their materials along."""
         defines = self.surface_defines if self.emitter_count else self.ray_defines
         return defines | {"HAS_EMITTERS": self.emitter_count > 0}
+
+    @property
+    def sheet_defines(self) -> dict:
+        """For shaders that light patches or find them."""
+        return {"HAS_SHEETS": self.has_sheets}
+
+    def bind_sheets(self, shader, numbers=None) -> None:
+        """Binds what a shader compiled with ``sheet_defines`` declares; ``numbers``: sheets of patches or texels."""
+        if self.has_sheets:
+            self.bind(shader, "sheets")
+            if numbers is not None:
+                shader.uniform_sampler("sheet_numbers", numbers)
 
     def bind(self, shader, *names: str) -> None:
         for name in names:

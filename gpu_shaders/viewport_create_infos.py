@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from .create_infos import _image, _ints, _lookup, _samplers, _scene
+from .create_infos import _image, _ints, _lookup, _samplers, _scene, _sheet_files, _sheets
 
 _VIEW = "view_info[9]"
 _SHADE = "shade_info[2]"
@@ -13,7 +13,7 @@ def _shading(info, defines: dict, first: int) -> int:
     """What viewport_shade_lib declares: lamps, the field where there is one, and what to show of them."""
     _ints(info, "light_count", "sample_index")
     slot = _samplers(info, "lights", first=first)
-    return _field(info, defines, slot)
+    return _field(info, defines, _sheets(info, defines, slot))
 
 
 def _field(info, defines: dict, first: int) -> int:
@@ -38,6 +38,7 @@ def _shading_files(defines: dict) -> list[str]:
         "offset_lib",
         "ray_lib",
         "direct_light_lib",
+        *_sheet_files(defines),
         "viewport_shade_lib",
     ]
 

@@ -177,6 +177,7 @@ class ViewportPass:
         shader.bind()
         self._scene.bind_surfaces(shader)
         self._scene.bind(shader, "lights")
+        self._scene.bind_sheets(shader)
         shader.uniform_int("light_count", (self._scene.light_count,))
         shader.uniform_int("sample_index", (self._sample.index,))
         shade_info = self._bind_field(shader, field, depth_only)
@@ -224,6 +225,7 @@ class ViewportPass:
             VOLUMES=len(self._fields) if len(self._fields) > 1 else None,
             **(field.defines if field else NO_FIELD),
             **self._scene.surface_defines,
+            **self._scene.sheet_defines,
         )
 
     def _spheres(self, field: FieldTextures, eye: np.ndarray, probes: Probes) -> _Spheres:

@@ -3,7 +3,8 @@
 
 The settings remove everything by which Cycles trades truth for speed: clamping, light thresholds, filters wider than a
 pixel, adaptive sampling, denoising, switched-off caustics. Light objects are hidden from the camera because probes hold
-the light of surfaces and of the world only.
+the light of surfaces and of the world only; of other objects it sees those that diffuse rays see, because what probes
+light is diffuse.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ def render_panoramas(
     """
     positions = np.asarray(positions, float).reshape(-1, 3)
     panoramas = np.empty((len(positions), height, width, 3), np.float32)
-    with scene_copy(scene, frame) as copy, _lights_hidden_from_camera(copy):
+    with scene_copy(scene, frame) as copy, _seen_as_by_diffuse_rays():
         positions = positions - _brought_near(copy, positions)
         unbiased_settings(copy, samples, bounces)
         copy.render.resolution_x, copy.render.resolution_y = width, height
@@ -200,13 +201,15 @@ def unbiased_settings(scene: bpy.types.Scene, samples: int, bounces: int) -> Non
 
 
 @contextmanager
-def _lights_hidden_from_camera(scene: bpy.types.Scene) -> Iterator[None]:
-    """Hide every light object from camera rays; instanced lights follow the object they are instances of."""
-    lights = [item for item in bpy.data.objects if item.type == "LIGHT" and item.visible_camera]
+def _seen_as_by_diffuse_rays() -> Iterator[None]:
+    """Let the camera see what diffuse rays see, and no light object; instanced lights follow the object they are
+    instances of."""
+    wanted = {item: item.type != "LIGHT" and item.visible_diffuse for item in bpy.data.objects}
+    changed = [item for item, seen in wanted.items() if item.visible_camera != seen]
     try:
-        for light in lights:
-            light.visible_camera = False
+        for item in changed:
+            item.visible_camera = wanted[item]
         yield
     finally:
-        for light in lights:
-            light.visible_camera = True
+        for item in changed:
+            item.visible_camera = not wanted[item]

@@ -10,9 +10,10 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ..core.light_profiles import LightProfile
 from ..core.snapshot import Light
 from .images import ImageTable
-from .light_flux import known_tint, measured_tint
+from .light_flux import known_profile, measured_profile
 from .node_links import active_output, find_socket
 from .notices import Notices
 from .shader_nodes import NodeEvaluator
@@ -39,32 +40,31 @@ class LightTable:
         Lights that add nothing to diffuse light are passed over: portals, those without power, those invisible to
         diffuse rays.
         """
-        light = _read_light(item, matrix, name, self._node_tint(item.data), self._notices)
+        light = _read_light(item, matrix, name, *self._node_tint(item.data), self._notices)
         if light is not None:
             self.lights.append(light)
 
-    def _node_tint(self, data: bpy.types.Light) -> np.ndarray:
-        """(3,) factor of the light's shader nodes, averaged over its surface."""
+    def _node_tint(self, data: bpy.types.Light) -> tuple[np.ndarray, LightProfile | None]:
+        """(3,) factor of the light's shader nodes, averaged over its surface, and what they do beyond that."""
         if not data.use_nodes or data.node_tree is None:
-            return np.ones(3)
+            return np.ones(3), None
         output = active_output(data.node_tree, "ShaderNodeOutputLight")
         if output is None:
-            return np.zeros(3)
+            return np.zeros(3), None
         notices = Notices()
         evaluator = NodeEvaluator(f"light '{data.name}'", self._images, notices, data.name)
         emission = evaluate_shader(evaluator, find_socket(output.inputs, "Surface")).emission
         if data.type != "SUN" and (evaluator.loses_pattern or not emission.is_constant):
-            tint = measured_tint(data) if self._measures else known_tint(data)
-            if tint is not None:
-                self._notices.group("light that differs with direction or distance enters with its mean", data.name)
-                return tint
+            profile = measured_profile(data) if self._measures else known_profile(data)
+            if profile is not None:
+                return np.ones(3), profile
         self._notices.extend(notices)
         if not emission.is_constant:
             self._notices.append(f"light '{data.name}': the texture on it is not supported; its mean colour is used")
-        return emission.rgb()
+        return emission.rgb(), None
 
 
-def _read_light(item, matrix, name, node_tint, notices) -> Light | None:
+def _read_light(item, matrix, name, node_tint, profile, notices) -> Light | None:
     data = item.data
     if not item.visible_diffuse or (data.type == "AREA" and data.cycles.is_portal):
         return None
@@ -87,6 +87,7 @@ def _read_light(item, matrix, name, node_tint, notices) -> Light | None:
         "casts_shadow": bool(data.use_shadow),
         "dynamic": is_dynamic(item),
         "group": str(item.get(GROUP_PROPERTY, "")),
+        "profile": profile,
     }
     kind = _KINDS[data.type](data, scale)
     values["color"] = tuple(float(value) for value in color * kind.pop("unit"))

@@ -7,23 +7,34 @@ per material (the base colour's, else the opacity's, else the emission's) and at
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
-from ..core.snapshot import DITHERED, NO_IMAGE, Material
+from ..core.snapshot import DIFFUSE_RAYS, DITHERED, NO_IMAGE, Material
 from .images import ImageTable
 from .node_links import Unsupported, active_output, find_socket
 from .notices import Notices
 from .procedurals import sampler_of
 from .shader_nodes import NodeEvaluator
-from .shader_values import ONE, Domain, Value, apply, constant
+from .shader_values import ONE, Domain, Value, add, apply, constant
 from .surface_parts import SurfaceParts
 from .surface_shaders import DEFAULT_GREY, HOLE, Closure, evaluate_shader
 from .surface_values import SurfaceEvaluator
 
 _LEAST_OPACITY = 1e-3  # less is no surface, and what misses less than this of 1 is solid
+
+
+@dataclass(frozen=True)
+class Look:
+    """What an object makes of its materials."""
+
+    intensity: float = 1.0  # factor on emission
+    unseen_by: int = 0  # see core.snapshot.Material
+
+
+PLAIN = Look()
 
 
 class MaterialTable:
@@ -35,16 +46,18 @@ class MaterialTable:
         self._images = images
         self._notices = notices
         self._surfaces = surfaces
-        self._indices: dict[tuple[int, float], int] = {}
+        self._indices: dict[tuple[int, Look], int] = {}
 
-    def index(self, material: bpy.types.Material | None, intensity: float = 1.0) -> int:
-        """Row of ``material`` with its emission times ``intensity``; None is Blender's default grey surface."""
-        key = (material.as_pointer() if material is not None else 0, intensity)
-        if key not in self._indices and intensity != 1.0:
+    def index(self, material: bpy.types.Material | None, look: Look = PLAIN) -> int:
+        """Row of ``material`` on objects of that ``look``; None is Blender's default grey surface."""
+        key = (material.as_pointer() if material is not None else 0, look)
+        if key not in self._indices and look != PLAIN:
             own = self.index(material)
             row = self.materials[own]
             self._indices[key] = len(self.materials)
-            self.materials.append(replace(row, emission=_three(value * intensity for value in row.emission)))
+            factor = 0.0 if look.unseen_by & DIFFUSE_RAYS else look.intensity  # what no ray sees lights nothing
+            emission = _three(value * factor for value in row.emission)
+            self.materials.append(replace(row, emission=emission, unseen_by=look.unseen_by))
             self.domains.append(self.domains[own])
         elif key not in self._indices:
             self._indices[key] = len(self.materials)
@@ -94,7 +107,9 @@ class MaterialTable:
         evaluator = NodeEvaluator(owner, self._images, notices, material.name, sampler_of(material))
         closure = evaluate_shader(evaluator, surface)
         placed = {
-            value.domain for value in (closure.diffuse, closure.opacity, closure.emission) if not value.is_constant
+            value.domain
+            for value in (closure.diffuse, closure.through, closure.opacity, closure.emission)
+            if not value.is_constant
         }
         samples = None
         if evaluator.loses_pattern or len(placed) > 1:
@@ -109,15 +124,16 @@ class MaterialTable:
 
     def _append(self, name: str, closure: Closure, backface_culling: bool) -> None:
         opacity = _solid_where_opaque(closure.opacity)
+        sent_back, transmitted = self._sent_back(name, closure)
         placed = [
             value
-            for value in (closure.diffuse, opacity, closure.emission)
+            for value in (sent_back, opacity, closure.emission)
             if not value.is_constant and value.domain.uv_map is not None
         ]
         domain = placed[0].domain if placed else Domain()
         diffuse, opacity, emission = (
             self._in_domain(name, role, value, domain)
-            for role, value in (("base colour", closure.diffuse), ("alpha", opacity), ("emission", closure.emission))
+            for role, value in (("base colour", sent_back), ("alpha", opacity), ("emission", closure.emission))
         )
         if opacity.is_constant and opacity.number() < _LEAST_OPACITY and not emission.is_zero():
             self._notices.group("emission on a transparent surface is kept and the surface blocks light", name)
@@ -137,9 +153,25 @@ class MaterialTable:
                 emission_image=NO_IMAGE if emission.is_constant else self._add(f"{name} emission", emission, None),
                 alpha=opacity.number() if opacity.is_constant else 1.0,
                 alpha_threshold=0.0 if opacity.is_constant and opacity.number() > 1 - _LEAST_OPACITY else DITHERED,
+                transmitted=transmitted,
                 backface_culling=backface_culling,
             )
         )
+
+    def _sent_back(self, name: str, closure: Closure) -> tuple[Value, tuple[float, float, float]]:
+        """What the surface sends on either side of what arrives, and the share of it that has gone through."""
+        if closure.through.is_zero():
+            return closure.diffuse, (0.0, 0.0, 0.0)
+        if closure.diffuse.is_zero():
+            return closure.through, (1.0, 1.0, 1.0)
+        one_pattern = (
+            closure.diffuse.pixels is closure.through.pixels and closure.diffuse.domain == closure.through.domain
+        )
+        if not one_pattern:
+            self._notices.group("where translucency changes over a surface its mean share is used", name)
+        whole = add(closure.diffuse, closure.through)
+        mean = np.maximum(np.broadcast_to(whole.mean(), 3), 1e-9)
+        return whole, _three(np.clip(np.broadcast_to(closure.through.mean(), 3) / mean, 0.0, 1.0))
 
     def _in_domain(self, name: str, role: str, value: Value, domain: Domain) -> Value:
         """``value`` as it can be sampled with the material's one mapping: textures that lie elsewhere become their

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.snapshot import Light, SceneSnapshot, World
+from ..core.snapshot import DIFFUSE_RAYS, SHADOW_RAYS, Light, SceneSnapshot, World
 from ..core.steps import Steps, run
 from .camera import read_camera
 from .evaluation import as_in_viewport, at_render_quality, rendered_objects
@@ -17,7 +17,7 @@ from .geometry import MeshArrays, MeshCopy, WorldTriangles, copy_mesh, place, tr
 from .images import ImageTable
 from .instance_facts import InstanceFacts, facts_of
 from .lights import INTENSITY_PROPERTY, LightTable
-from .materials import MaterialTable, apply_domain
+from .materials import Look, MaterialTable, apply_domain
 from .notices import Notices
 from .surface_parts import SurfaceParts
 from .surface_values import ATLAS, Wants, wants
@@ -43,7 +43,7 @@ class _Instances:
     mesh_key: tuple
     mesh: MeshArrays = field(init=False)  # as soon as the mesh's copy is triangulated
     materials: list[bpy.types.Material | None]  # per slot, original datablocks
-    intensity: float  # factor on emission
+    look: Look
     facts: InstanceFacts  # of the first one
     matrices: list[np.ndarray] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
@@ -211,23 +211,24 @@ def _harvest(
             notices.group("objects whose transform is not finite are left out", name)
         elif item.type == "LIGHT":
             harvest.lights.append((item.original, matrix, name))
-        elif _receives_diffuse_rays(item, notices):
+        elif item.visible_diffuse or item.visible_shadow:
+            _warn_of(item, notices)
             _add_mesh(harvest, item, instance, matrix, name)
     return harvest
 
 
-def _receives_diffuse_rays(item: bpy.types.Object, notices: Notices) -> bool:
-    """Whether light transport meets the object at all; half-visible objects count as visible."""
+def _warn_of(item: bpy.types.Object, notices: Notices) -> None:
+    """What of the object is left out."""
     for system in item.particle_systems:
         if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
             notices.group("particle hair is not supported and is left out", item.name)
-    if not item.visible_diffuse and not item.visible_shadow:
-        return False
-    if not (item.visible_diffuse and item.visible_shadow):
-        notices.group("ray visibility is not supported: these reflect light and cast shadows", item.name)
     if item.is_shadow_catcher or item.is_holdout:
         notices.group("holdouts and shadow catchers are lit like any other surface", item.name)
-    return True
+
+
+def _look(item: bpy.types.Object) -> Look:
+    unseen = (0 if item.visible_shadow else SHADOW_RAYS) + (0 if item.visible_diffuse else DIFFUSE_RAYS)
+    return Look(float(item.get(INTENSITY_PROPERTY, 1.0)), unseen)
 
 
 def _add_mesh(harvest: _Harvest, item, instance, matrix: np.ndarray, name: str) -> None:
@@ -238,15 +239,15 @@ def _add_mesh(harvest: _Harvest, item, instance, matrix: np.ndarray, name: str) 
     key = (mesh.as_pointer(), attributes)
     if key not in harvest.meshes:
         harvest.meshes[key] = _copy_of(item, sorted(attributes)), name
-    intensity = float(item.get(INTENSITY_PROPERTY, 1.0))
+    look = _look(item)
     alone = -1
     if any(one.instance for one in asked):
         alone = harvest.alone = min(harvest.alone + 1, _MOST_ALONE)
-    group_key = (key, intensity, alone, *(material.as_pointer() if material else 0 for material in slots))
+    group_key = (key, look, alone, *(material.as_pointer() if material else 0 for material in slots))
     group = harvest.groups.get(group_key)
     if group is None:
         facts = facts_of(item, instance, frozenset().union(*(one.properties for one in asked)))
-        group = harvest.groups[group_key] = _Instances(key, slots, intensity, facts)
+        group = harvest.groups[group_key] = _Instances(key, slots, look, facts)
     group.matrices.append(matrix)
     group.names.append(name)
 
@@ -295,7 +296,7 @@ def _assemble(
 ) -> dict | None:
     """World triangles of ``group`` with their per-triangle arrays; None where nothing is left."""
     mesh = group.mesh
-    rows = np.array([materials.index(material, group.intensity) for material in group.materials], np.int32)
+    rows = np.array([materials.index(material, group.look) for material in group.materials], np.int32)
     used = rows[np.clip(mesh.slots, 0, len(rows) - 1)]
     uvs = _corner_uvs(mesh, used, materials, group.names[0], notices)
     for row, material in zip(rows, group.materials):

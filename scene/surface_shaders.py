@@ -4,10 +4,11 @@
 What each closure becomes is chosen so that the light that leaves the surface, summed over all directions, is as close
 to Cycles as a diffuse reflector with holes can be:
 
-- Diffuse, Subsurface, Toon, Sheen, Translucent reflect diffusely what they send back in all. So do glossy nodes, metal
+- Diffuse, Subsurface, Toon, Sheen reflect diffusely what they send back in all. So do glossy nodes, metal
   and the specular and coat layers of Principled (``albedos``): the energy is right, the direction is spread, which a
   warning says where it matters. Black instead left a room with metal walls 70 % too dark, this is 3 % too
   bright.
+- Translucent lets light through diffusely: what arrives on one side leaves on the other.
 - Glass, Refraction and the transmitting part of Principled let light through unbent and uncoloured: a hole. Thin panes
   are what such materials mostly are, and caustics of solid glass are beyond a light probe.
 - Mix Shader and Add Shader combine these per pixel. Normal inputs are ignored; they turn light, they do not make it.
@@ -38,13 +39,14 @@ DEFAULT_GREY = constant([0.8, 0.8, 0.8])
 
 @dataclass(frozen=True)
 class Closure:
-    """``diffuse`` is the albedo of the part that is not hole, ``opacity`` that part, ``emission`` radiance of the
-    whole.
+    """``diffuse`` is the albedo of the part that is not hole, ``through`` what that part lets through diffusely,
+    ``opacity`` its share of the whole, ``emission`` radiance of the whole.
     """
 
     diffuse: Value = constant([0.0, 0.0, 0.0])
     opacity: Value = ONE
     emission: Value = constant([0.0, 0.0, 0.0])
+    through: Value = constant([0.0, 0.0, 0.0])
 
 
 BLACK = Closure()
@@ -147,8 +149,7 @@ def _rough_diffuse(evaluator, node, scope):
 
 
 def _translucent(evaluator, node, scope):
-    evaluator.notices.group("translucent shaders reflect instead of letting light through", evaluator.owner_name)
-    return _diffuse(evaluator, node, scope)
+    return Closure(through=evaluator.input(node, "Color", scope))
 
 
 def _glass(evaluator, node, scope):
@@ -183,46 +184,51 @@ def _mix(evaluator, node, scope):
     else:
         factor = apply(lambda f: np.clip(f, 0, 1), factor)
     return Closure(
-        _opaque_mix(factor, first, second),
+        _opaque_mix(factor, first.opacity, second.opacity, first.diffuse, second.diffuse),
         blend(factor, first.opacity, second.opacity),
         blend(factor, first.emission, second.emission),
+        _opaque_mix(factor, first.opacity, second.opacity, first.through, second.through),
     )
 
 
-def _opaque_mix(factor: Value, first: Closure, second: Closure) -> Value:
-    """Albedo of the opaque part of a mix: a hole takes part of the area, not of the colour."""
-    if first.opacity.is_zero():
-        return second.diffuse
-    if second.opacity.is_zero():
-        return first.diffuse
-    if first.opacity.is_one() and second.opacity.is_one():
-        return blend(factor, first.diffuse, second.diffuse)
+def _opaque_mix(factor: Value, opacity: Value, other_opacity: Value, color: Value, other_color: Value) -> Value:
+    """Colour of the opaque part of a mix of two: a hole takes part of the area, not of the colour."""
+    if opacity.is_zero():
+        return other_color
+    if other_opacity.is_zero():
+        return color
+    if opacity.is_one() and other_opacity.is_one():
+        return blend(factor, color, other_color)
 
     def weighted(f, first_opacity, second_opacity, first_color, second_color):
         one, other = first_opacity * (1 - f), second_opacity * f
         total = one + other
         return (first_color * one + second_color * other) / np.where(total > 0, total, 1)
 
-    return apply(weighted, factor, first.opacity, second.opacity, first.diffuse, second.diffuse)
+    return apply(weighted, factor, opacity, other_opacity, color, other_color)
 
 
 def _add(evaluator, node, scope):
     first, second = (evaluate_shader(evaluator, item, scope) for item in node.inputs[:2])
     emission = add(first.emission, second.emission)
     if first.opacity.is_one() and second.opacity.is_one():
-        return Closure(add(first.diffuse, second.diffuse), ONE, emission)
+        return Closure(add(first.diffuse, second.diffuse), ONE, emission, add(first.through, second.through))
     opacity = apply(
         lambda a, b: np.clip(a + b - 1, 0, 1), first.opacity, second.opacity
     )  # what both let through adds up
-    diffuse = apply(
-        lambda a, b, c, d, o: np.where(o > 0, np.clip((a * b + c * d) / np.where(o > 0, o, 1), 0, 1), 0),
-        first.diffuse,
-        first.opacity,
-        second.diffuse,
-        second.opacity,
-        opacity,
-    )
-    return Closure(diffuse, opacity, emission)
+
+    def of_opaque(color, other_color):
+        return apply(
+            lambda a, b, c, d, o: np.where(o > 0, np.clip((a * b + c * d) / np.where(o > 0, o, 1), 0, 1), 0),
+            color,
+            first.opacity,
+            other_color,
+            second.opacity,
+            opacity,
+        )
+
+    diffuse, through = (of_opaque(getattr(first, name), getattr(second, name)) for name in ("diffuse", "through"))
+    return Closure(diffuse, opacity, emission, through)
 
 
 _SHADERS = {

@@ -23,8 +23,13 @@ void main()
   vec2 barycentric = vec2(dot(cross(offset, ac), normal), dot(cross(ab, offset), normal)) / squared;
   vec3 weights = max(vec3(1.0 - barycentric.x - barycentric.y, barycentric), vec3(0.0)); /* covered, but a little outside */
   barycentric = weights.yz / (weights.x + weights.y + weights.z);
+#ifdef HAS_UNSEEN
+  if ((int(element(triangle_corners, 3 * index + 1).w) & 4) != 0) { /* by diffuse rays, see ray_lib */
+    discard;
+  }
+#endif
 #ifdef HAS_ALPHA
-  if (element(triangle_corners, 3 * index + 1).w != 0.0 && is_hole(index, barycentric)) {
+  if ((int(element(triangle_corners, 3 * index + 1).w) & 1) != 0 && is_hole(index, barycentric)) {
     discard;
   }
 #endif

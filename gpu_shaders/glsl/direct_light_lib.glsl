@@ -2,8 +2,13 @@
  * reference: core/direct_light.py.
  *
  * lights, 6 elements each (scene_textures.py):
- *   position, kind | color, radius | right, size x | up, size y | back, casts shadow | parameters of the kind
+ *   position, kind | color, radius | right, size x | up, size y | back, casts shadow | parameters of the kind, profile
+ * After all lights their profiles (core/light_profiles.py), PROFILE_WIDTH × PROFILE_HEIGHT directions and PROFILE_DISTANCES logarithms each;
+ * a light's profile is the first element of its own, 0 for none.
  */
+
+const int PROFILE_WIDTH = 64, PROFILE_HEIGHT = 32, PROFILE_DISTANCES = 5;
+const float LEAST_PROFILE_DISTANCE = 0.25; /* metres; each is four times the one before */
 
 #ifndef FIRST_LIGHT
 #define FIRST_LIGHT 0
@@ -27,7 +32,28 @@ float spot_mask(int light, vec3 towards, vec3 back, vec4 parameters)
   return x * x * (3.0 - 2.0 * x);
 }
 
-LightSample sample_light(int light, vec3 point, vec2 u)
+/* What a light's nodes make of the light that goes from it along `direction`, by which it is seen, over `distance`. */
+vec3 profile_factor(int light, int profile, vec3 direction, float distance)
+{
+  vec3 local = -vec3(dot(direction, element(lights, 6 * light + 2).xyz), dot(direction, element(lights, 6 * light + 3).xyz),
+                     dot(direction, element(lights, 6 * light + 4).xyz));
+  vec2 place = vec2(0.5 - atan(local.y, local.x) * 0.15915494309189535,
+                    atan(local.z, length(local.xy)) * 0.3183098861837907 + 0.5);
+  place = place * vec2(float(PROFILE_WIDTH), float(PROFILE_HEIGHT)) - 0.5;
+  ivec2 low = ivec2(floor(place));
+  vec2 blend = place - vec2(low);
+  int left = (low.x + PROFILE_WIDTH) % PROFILE_WIDTH, right = (low.x + 1) % PROFILE_WIDTH;
+  int bottom = profile + PROFILE_WIDTH * clamp(low.y, 0, PROFILE_HEIGHT - 1);
+  int top = profile + PROFILE_WIDTH * clamp(low.y + 1, 0, PROFILE_HEIGHT - 1);
+  vec3 factor = mix(mix(element(lights, bottom + left).rgb, element(lights, bottom + right).rgb, blend.x),
+                    mix(element(lights, top + left).rgb, element(lights, top + right).rgb, blend.x), blend.y);
+  float along = 0.5 * log2(max(distance, 1.0e-6) / LEAST_PROFILE_DISTANCE);
+  int first = clamp(int(floor(along)), 0, PROFILE_DISTANCES - 2);
+  int curve = profile + PROFILE_WIDTH * PROFILE_HEIGHT + first;
+  return factor * exp2(mix(element(lights, curve).x, element(lights, curve + 1).x, along - float(first)));
+}
+
+LightSample sample_plain_light(int light, vec3 point, vec2 u)
 {
   vec4 position_kind = element(lights, 6 * light);
   vec4 color_radius = element(lights, 6 * light + 1);
@@ -102,6 +128,16 @@ LightSample sample_light(int light, vec3 point, vec2 u)
   }
   if (kind == SPOT) {
     light_sample.irradiance *= spot_mask(light, light_sample.direction, back_shadow.xyz, parameters);
+  }
+  return light_sample;
+}
+
+LightSample sample_light(int light, vec3 point, vec2 u)
+{
+  LightSample light_sample = sample_plain_light(light, point, u);
+  int profile = int(element(lights, 6 * light + 5).w);
+  if (profile > 0) {
+    light_sample.irradiance *= profile_factor(light, profile, light_sample.direction, light_sample.distance);
   }
   return light_sample;
 }

@@ -1,6 +1,6 @@
 /* Cells of patches: which one a hit lies in, and the table that tells which patch a cell has. Reference: core/patches.py.
  *
- * A cell's key is (place x, y, z; number of level, facing and variant), whole numbers that floats hold exactly.
+ * A cell's key is (place x, y, z; number of sheet, level, facing and variant), whole numbers that floats hold exactly.
  *
  * The table has open addresses: an entry of `table` is 0 (free), the number of a patch + 1, or CLAIM + the number of a hit of the bind in
  * hand whose cell has no patch yet. Which hit claims an entry first depends on the driver; which patch a cell gets does not: its leader is
@@ -10,6 +10,7 @@
 const uint CLAIM = 0x80000000u;
 const float NO_PATCH = -1.0, NOTHING = -2.0, PENDING = -3.0; /* in place of a patch */
 const int VARIANT_COUNT = 4;
+const float LEVELS_AND_FACINGS = 1728.0; /* 64 levels, 27 facings */
 
 uint cell_hash(vec4 key)
 {

@@ -4,8 +4,18 @@
  * (A thread for all samples of a patch would be simpler, but software drivers end every loop of a thread that has gone round 65 535 times.)
  * Fewer samples than points take one of each equal run of points, all the same one of their runs, which is random.
  * The key of a number is (first_key + patch, light, seed); its index counts samples, so the points of a patch share one stratified sequence.
- * patch_points, POINTS elements a patch: position, packed normal. patches: index of a patch in x.
+ * patch_points, POINTS elements a patch: position, packed normal. patches: index of a patch in x. sheet_numbers: of each patch.
  */
+
+vec3 irradiance_of_side(vec3 point, vec3 normal, uvec3 key, int index)
+{
+  vec3 origin = leave_surface(point, normal);
+  vec3 irradiance = lamps_irradiance(point, origin, normal, key, index);
+#ifdef HAS_EMITTERS
+  irradiance += emitter_irradiance(point, origin, normal, key + uvec3(0u, 0u, 0x2545F491u), index);
+#endif
+  return irradiance;
+}
 
 void main()
 {
@@ -27,10 +37,14 @@ void main()
     int place = samples < POINTS ? (i * POINTS + shift) / samples : i % POINTS;
     vec4 at = element(patch_points, POINTS * patch_index + place);
     vec3 normal = unpack_normal(at.w);
-    vec3 origin = leave_surface(at.xyz, normal);
-    irradiance += lamps_irradiance(at.xyz, origin, normal, key, i);
-#ifdef HAS_EMITTERS
-    irradiance += emitter_irradiance(at.xyz, origin, normal, key + uvec3(0u, 0u, 0x2545F491u), i);
+#ifdef HAS_SHEETS
+    vec3 through = share_of_back(int(element(sheet_numbers, patch_index).x));
+    irradiance += (1.0 - through) * irradiance_of_side(at.xyz, normal, key, i);
+    if (through != vec3(0.0)) {
+      irradiance += through * irradiance_of_side(at.xyz, -normal, key + uvec3(0u, BACK_STREAM, 0u), i);
+    }
+#else
+    irradiance += irradiance_of_side(at.xyz, normal, key, i);
 #endif
   }
   imageStore(sums, element_position(thread_number), vec4(irradiance, 0.0));

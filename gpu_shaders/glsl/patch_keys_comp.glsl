@@ -46,5 +46,9 @@ void main()
 #endif
   int level = (floatBitsToInt(wanted) >> 23) - 127 + coarser; /* ⌊log2⌋ */
   vec3 place = floor(at.xyz * ldexp(1.0 / edge, -level) + rule.z);
-  imageStore(hit_keys, element_position(hit), vec4(place, float((level + 16) * 27) + facing(at.w)));
+  float number = float((level + 16) * 27) + facing(at.w);
+#ifdef HAS_SHEETS
+  number += LEVELS_AND_FACINGS * element(hit_sheets, hit).x;
+#endif
+  imageStore(hit_keys, element_position(hit), vec4(place, number));
 }

@@ -21,6 +21,9 @@ void main()
       imageStore(table, element_position(slot), uvec4(uint(number + 1)));
       imageStore(patch_keys, element_position(number), vec4(key.xyz, key.w * float(VARIANT_COUNT) + float(variant)));
       imageStore(patch_points, element_position(number * POINTS), element(hits, hit));
+#ifdef HAS_SHEETS
+      imageStore(patch_sheets, element_position(number), vec4(floor(key.w / LEVELS_AND_FACINGS)));
+#endif
       number++;
     }
   }

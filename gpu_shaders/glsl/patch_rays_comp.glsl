@@ -4,7 +4,19 @@
  * patch; with SEGMENTS above 1 a ray goes on as a path, and direct light is sampled where it bounces.
  * Writes for each ray, counted from first_ray but for `reflected`: hits (position, packed normal; −1 where nothing more can come), `carried` (emission that points
  * on emitters do not answer for, or the world, and direct light at the bounces) and `reflected` (product of the albedos on the way).
+ * Of patches on sheets every second ray leaves from the back; `hit_sheets` are those that rays end on.
  */
+
+#if SEGMENTS > 1
+vec3 irradiance_at(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
+{
+  vec3 irradiance = lamps_irradiance(point, origin, normal, key, index);
+#ifdef HAS_EMITTERS
+  irradiance += emitter_irradiance(point, origin, normal, key, index);
+#endif
+  return irradiance;
+}
+#endif
 
 void main()
 {
@@ -16,10 +28,17 @@ void main()
   int number = (first_ray + entry) - patch_index * rays_each;
   vec4 at = element(patch_points, POINTS * patch_index + number * POINTS / rays_each % POINTS);
   vec3 normal = unpack_normal(at.w);
+  vec3 brought = vec3(0.0), throughput = vec3(1.0);
+  int sheet = 0;
+#ifdef HAS_SHEETS
+  vec3 through = share_of_back(int(element(sheet_numbers, patch_index).x));
+  bool crosses = through != vec3(0.0) && (number & 1) != 0;
+  normal = crosses ? -normal : normal;
+  throughput = side_weight(through, crosses);
+#endif
   vec3 origin = leave_surface(at.xyz, normal);
   uvec3 key = uvec3(uint(first_key + patch_index), 0x85EBCA6Bu, uint(seed));
   vec4 end = vec4(0.0, 0.0, 0.0, -1.0);
-  vec3 brought = vec3(0.0), throughput = vec3(1.0);
   throughput = at.w < 0.0 ? vec3(0.0) : throughput; /* a texel that reflects nothing */
   for (int segment = 0; segment < SEGMENTS && throughput != vec3(0.0); segment++) {
     vec3 direction = sample_cosine(normal, sample_r2(key + uvec3(0u, uint(segment), 0u), number));
@@ -36,21 +55,39 @@ void main()
     if (throughput == vec3(0.0)) {
       break;
     }
-    end = vec4(pull_back(surface.position, direction, hit.distance), pack_normal(octahedral_encode(surface.normal)));
+#ifdef HAS_SHEETS
+    sheet = sheet_of_triangle(hit.triangle);
+#endif
+    end.xyz = sheet > 0 ? surface.position : pull_back(surface.position, direction, hit.distance);
+    end.w = pack_normal(octahedral_encode(surface.normal));
 #if SEGMENTS > 1
     if (segment < SEGMENTS - 1) {
       normal = surface.normal;
       origin = step_off(surface.position, normal, -direction, hit.distance);
       uvec3 light_key = key + uvec3(0u, 0x1B873593u + uint(segment), 0u);
-      vec3 irradiance = lamps_irradiance(surface.position, origin, normal, light_key, number);
-#ifdef HAS_EMITTERS
-      irradiance += emitter_irradiance(surface.position, origin, normal, light_key, number);
+      vec3 irradiance = irradiance_at(surface.position, origin, normal, light_key, number);
+#ifdef HAS_SHEETS
+      through = share_of_back(sheet);
+      if (through != vec3(0.0)) {
+        vec3 behind = step_off(surface.position, -normal, direction, hit.distance);
+        uvec3 back_key = light_key + uvec3(0u, BACK_STREAM, 0u);
+        irradiance = (1.0 - through) * irradiance + through * irradiance_at(surface.position, behind, -normal, back_key, number);
+        crosses = (pcg3d(key + uvec3(uint(number), SIDE_STREAM + uint(segment), 0u)).x & 1u) != 0u;
+        normal = crosses ? -normal : normal;
+        origin = crosses ? behind : origin;
+      }
 #endif
       brought += throughput * irradiance * 0.3183098861837907;
+#ifdef HAS_SHEETS
+      throughput *= side_weight(through, crosses);
+#endif
     }
 #endif
   }
   imageStore(hits, element_position(entry), throughput == vec3(0.0) ? vec4(0.0, 0.0, 0.0, -1.0) : end);
   imageStore(carried, element_position(entry), vec4(brought, 0.0));
   imageStore(reflected, element_position(first_ray + entry), vec4(throughput, 0.0));
+#ifdef HAS_SHEETS
+  imageStore(hit_sheets, element_position(entry), vec4(float(sheet)));
+#endif
 }

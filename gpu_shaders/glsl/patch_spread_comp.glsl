@@ -9,6 +9,20 @@
 
 const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
 
+/* `share`: by which the light of this side counts. Adds to `variance` what candidates differ by. */
+float luminance_of_side(vec3 point, vec3 normal, uvec3 key, int index, float share, inout float variance)
+{
+  float luminance = share * dot(lamps_unshadowed(point, normal, key, index), LUMINANCE);
+#ifdef HAS_EMITTERS
+  float one = share * dot(emitter_unshadowed(point, normal, key, 2 * index), LUMINANCE);
+  float other = share * dot(emitter_unshadowed(point, normal, key, 2 * index + 1), LUMINANCE);
+  luminance += 0.5 * (one + other);
+  luminance += share * dot(emitter_direction_irradiance(leave_surface(point, normal), normal, key, index), LUMINANCE);
+  variance += 0.5 * (one - other) * (one - other) / float(POINTS / 2);
+#endif
+  return luminance;
+}
+
 void main()
 {
   int entry = LINEAR_THREAD;
@@ -22,13 +36,14 @@ void main()
   for (int i = 0; i < count; i++) {
     vec4 at = element(patch_points, POINTS * patch_index + 2 * i);
     vec3 normal = unpack_normal(at.w);
-    float luminance = dot(lamps_unshadowed(at.xyz, normal, key, i), LUMINANCE);
-#ifdef HAS_EMITTERS
-    float one = dot(emitter_unshadowed(at.xyz, normal, key, 2 * i), LUMINANCE);
-    float other = dot(emitter_unshadowed(at.xyz, normal, key, 2 * i + 1), LUMINANCE);
-    luminance += 0.5 * (one + other);
-    luminance += dot(emitter_direction_irradiance(leave_surface(at.xyz, normal), normal, key, i), LUMINANCE);
-    candidate_variance += 0.5 * (one - other) * (one - other) / float(count);
+#ifdef HAS_SHEETS
+    float through = dot(share_of_back(int(element(sheet_numbers, patch_index).x)), LUMINANCE);
+    float luminance = luminance_of_side(at.xyz, normal, key, i, 1.0 - through, candidate_variance);
+    if (through > 0.0) {
+      luminance += luminance_of_side(at.xyz, -normal, key + uvec3(0u, BACK_STREAM, 0u), i, through, candidate_variance);
+    }
+#else
+    float luminance = luminance_of_side(at.xyz, normal, key, i, 1.0, candidate_variance);
 #endif
     sum += luminance;
     squares += luminance * luminance;

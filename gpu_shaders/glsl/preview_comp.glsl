@@ -44,11 +44,11 @@ void main()
   vec3 origin = view_info[0].xyz + (orthographic ? across : vec3(0.0));
   vec3 direction = normalize(view_info[3].xyz + (orthographic ? vec3(0.0) : across));
 
-  Hit hit = trace_closest(origin, direction);
+  Hit hit = trace_view(origin, direction);
   vec4 seen = vec4(0.0);
   if (hit.triangle >= 0) {
     Surface surface = resolve_surface(hit.triangle, hit.barycentric, origin, direction, view_info[3].w);
-    seen = vec4(shade_surface(surface, direction, hit.distance, pixel_key(pixel), sample_index), 1.0);
+    seen = vec4(shade_surface(surface, hit.triangle, direction, hit.distance, pixel_key(pixel), sample_index), 1.0);
   }
   else if (shows_light()) {
     ivec2 texel = direction_texel(direction);

@@ -101,7 +101,16 @@ void main()
       throughput /= survival;
     }
     vec3 normal = surface.normal;
-    origin = step_off(surface.position, normal, -direction, hit.distance);
+    float side = 1.0;
+#ifdef HAS_SHEETS /* which side light is looked for on is chosen by its share */
+    vec3 through = share_of_back(sheet_of_triangle(hit.triangle));
+    float chance = dot(through, vec3(1.0 / 3.0));
+    bool crosses = random_pair(segment_key + uvec3(7u, 0u, 0u)).x < chance;
+    side = crosses ? -1.0 : 1.0;
+    throughput *= crosses ? through / chance : (1.0 - through) / (1.0 - chance);
+    normal *= side;
+#endif
+    origin = step_off(surface.position, normal, -side * direction, hit.distance);
     vec3 irradiance = lamps_irradiance(surface.position, origin, normal, segment_key + uvec3(1u, 0u, 0u), 0);
 #ifdef HAS_EMITTERS
     irradiance += emitter_irradiance(surface.position, origin, normal, segment_key + uvec3(5u, 0u, 0u), 0);

@@ -5,13 +5,14 @@
  * "Understanding the Efficiency of Ray Traversal on GPUs", HPG 2009): drivers that run threads side by side pay for both kinds of step
  * otherwise. The triangle test is watertight: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection",
  * JCGT 2013. Both sides of a triangle are hit. With HAS_ALPHA, triangles of clipped materials ask surface_lib's
- * `is_hole` first.
+ * `is_hole` first; with HAS_UNSEEN, rays pass triangles that their kind does not see.
  *
  * Samplers: bvh_nodes, triangle_corners.
  */
 
 const float NO_HIT = 3.0e38;
 const int NO_NODE = -2147483647; /* in place of a node or leaf */
+const int CLIPPED = 1, UNSEEN_BY_SHADOW_RAYS = 2, UNSEEN_BY_DIFFUSE_RAYS = 4; /* bits of a triangle, w of its corner 1 */
 
 struct Ray {
   vec3 origin;
@@ -77,8 +78,9 @@ bool starts_on(Ray ray, vec3 a, vec3 b, vec3 c)
   return rounding > 0.0 && abs(dot(normalize(cross(b - a, c - a)), a)) < rounding;
 }
 
-/* Tests triangle `index`; on a hit nearer than hit.distance replaces it. Returns true where its leaf ends. */
-bool intersect_triangle(Ray ray, int index, inout Hit hit)
+/* Tests triangle `index`; on a hit nearer than hit.distance replaces it. Returns true where its leaf ends. `unseen`: the bit of triangles
+ * that the ray passes. */
+bool intersect_triangle(Ray ray, int index, int unseen, inout Hit hit)
 {
   vec4 corner = element(triangle_corners, 3 * index);
   vec4 corner1 = element(triangle_corners, 3 * index + 1);
@@ -99,8 +101,13 @@ bool intersect_triangle(Ray ray, int index, inout Hit hit)
     if (distance > 0.0 && distance < hit.distance &&
         !starts_on(ray, corner.xyz - ray.origin, corner1.xyz - ray.origin, corner2.xyz - ray.origin)) {
       vec2 barycentric = vec2(v, w) / determinant;
+#ifdef HAS_UNSEEN
+      if ((int(corner1.w) & unseen) != 0) {
+        return corner.w != 0.0;
+      }
+#endif
 #ifdef HAS_ALPHA
-      if (corner1.w != 0.0 && is_hole(index, barycentric)) {
+      if ((int(corner1.w) & CLIPPED) != 0 && is_hole(index, barycentric)) {
         return corner.w != 0.0;
       }
 #endif
@@ -139,7 +146,7 @@ bool intersect_triangle(Ray ray, int index, inout Hit hit)
 #endif
 
 /* The nearest hit closer than `limit`; triangle −1 and distance `limit` where there is none. */
-Hit trace_within(vec3 origin, vec3 direction, float limit)
+Hit trace_nearest(vec3 origin, vec3 direction, float limit, int unseen)
 {
   Ray ray = make_ray(origin, direction);
   Hit hit = Hit(limit, -1, vec2(0.0));
@@ -171,16 +178,27 @@ Hit trace_within(vec3 origin, vec3 direction, float limit)
       }
     }
     int index = -1 - item;
-    while (!intersect_triangle(ray, index, hit)) {
+    while (!intersect_triangle(ray, index, unseen, hit)) {
       index++;
     }
     TAKE_NEXT
   }
 }
 
+Hit trace_within(vec3 origin, vec3 direction, float limit)
+{
+  return trace_nearest(origin, direction, limit, UNSEEN_BY_DIFFUSE_RAYS);
+}
+
 Hit trace_closest(vec3 origin, vec3 direction)
 {
   return trace_within(origin, direction, NO_HIT);
+}
+
+/* What an eye sees. */
+Hit trace_view(vec3 origin, vec3 direction)
+{
+  return trace_nearest(origin, direction, NO_HIT, 0);
 }
 
 /* Is anything hit nearer than `limit`? */
@@ -212,7 +230,7 @@ bool trace_any(vec3 origin, vec3 direction, float limit)
       }
     }
     int index = -1 - item;
-    while (!intersect_triangle(ray, index, hit)) {
+    while (!intersect_triangle(ray, index, UNSEEN_BY_SHADOW_RAYS, hit)) {
       index++;
     }
     if (hit.triangle >= 0) {

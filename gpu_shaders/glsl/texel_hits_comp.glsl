@@ -1,4 +1,5 @@
-/* Where texels meet surfaces that reflect, as one linear array: position and packed normal, −1 where there is nothing to light.
+/* Where texels meet surfaces that reflect, as one linear array: position and packed normal, −1 where there is nothing to light. With
+ * HAS_SHEETS also on which sheet each lies; hits on sheets stay on the surface, because rays leave it on both sides.
  *
  * Dispatch: x = columns, y = 6·FACE rows, z = probes; groups of 8×8×1. Element of a texel: (probe · 6·FACE + row) · FACE + column, for
  * layer first_layer + probe.
@@ -38,11 +39,20 @@ void main()
   ivec3 at = ivec3(id.xy, first_layer + id.z);
   vec4 seen = texelFetch(geometry, at, 0);
   vec4 hit = vec4(0.0, 0.0, 0.0, -1.0);
+  int sheet = 0;
   if (seen.z < NO_SURFACE && texelFetch(albedo, at, 0).rgb != vec3(0.0)) {
     vec3 direction = texel_direction(id.xy);
     vec3 point = element(probe_slots, first_slot + id.z).xyz + direction * abs(seen.z);
-    hit.xyz = pull_back(into_triangle(int(seen.w), point), direction, abs(seen.z));
+    hit.xyz = into_triangle(int(seen.w), point);
     hit.w = pack_normal(seen.xy);
+#ifdef HAS_SHEETS
+    sheet = sheet_of_triangle(int(seen.w));
+#endif
+    hit.xyz = sheet > 0 ? hit.xyz : pull_back(hit.xyz, direction, abs(seen.z));
   }
-  imageStore(hits, element_position((id.z * 6 * FACE + id.y) * FACE + id.x), hit);
+  ivec2 place = element_position((id.z * 6 * FACE + id.y) * FACE + id.x);
+  imageStore(hits, place, hit);
+#ifdef HAS_SHEETS
+  imageStore(hit_sheets, place, vec4(float(sheet)));
+#endif
 }

@@ -56,8 +56,25 @@ vec3 data_color(vec3 point)
 }
 #endif
 
-/* What is shown of a surface that a ray along `direction` met after `distance`. */
-vec3 shade_surface(Surface surface, vec3 direction, float distance, uvec3 key, int index)
+/* What a surface sends of the light on the side of its normal; `towards`: to where its ray came from. */
+vec3 side_radiance(Surface surface, vec3 direction, vec3 towards, float distance, uvec3 key, int index)
+{
+  int mode = shade_mode();
+  vec3 radiance = vec3(0.0);
+#ifdef HAS_FIELD
+  if (mode != DIRECT) {
+    radiance = surface.albedo * 0.3183098861837907 * shade_info[1].x * field_irradiance_at(surface.position, surface.normal);
+  }
+#endif
+  if (mode != INDIRECT) {
+    vec3 origin = step_off(surface.position, surface.normal, towards, distance);
+    radiance += lamps_radiance(surface, direction, origin, key, index);
+  }
+  return radiance;
+}
+
+/* What is shown of a surface on `triangle` that a ray along `direction` met after `distance`. */
+vec3 shade_surface(Surface surface, int triangle, vec3 direction, float distance, uvec3 key, int index)
 {
   int mode = shade_mode();
   if (mode == NORMALS) {
@@ -68,22 +85,27 @@ vec3 shade_surface(Surface surface, vec3 direction, float distance, uvec3 key, i
     float facing = 0.6 + 0.4 * abs(dot(surface.normal, direction));
     return display_to_linear(data_color(surface.position) * facing);
   }
-  vec3 indirect = mode == DIRECT ? vec3(0.0) : shade_info[1].x * field_irradiance_at(surface.position, surface.normal);
+  if (mode == IRRADIANCE) {
+    return shade_info[1].x * field_irradiance_at(surface.position, surface.normal) * 0.3183098861837907;
+  }
 #else
   if (mode >= VALIDITY) {
     return vec3(0.1);
   }
-  vec3 indirect = vec3(0.0);
-#endif
   if (mode == IRRADIANCE) {
-    return indirect * 0.3183098861837907;
+    return vec3(0.0);
   }
-  vec3 radiance = surface.albedo * 0.3183098861837907 * indirect;
-  if (mode != INDIRECT) {
-    vec3 origin = step_off(surface.position, surface.normal, -direction, distance);
-    radiance += surface.emission + lamps_radiance(surface, direction, origin, key, index);
+#endif
+  vec3 radiance = side_radiance(surface, direction, -direction, distance, key, index);
+#ifdef HAS_SHEETS
+  vec3 through = share_of_back(sheet_of_triangle(triangle));
+  if (through != vec3(0.0)) {
+    surface.normal = -surface.normal;
+    vec3 behind = side_radiance(surface, direction, direction, distance, key + uvec3(0u, BACK_STREAM, 0u), index);
+    radiance = mix(radiance, behind, through);
   }
-  return radiance;
+#endif
+  return mode == INDIRECT ? radiance : radiance + surface.emission;
 }
 
 /* One key a pixel, so that soft shadows look the same in every kind of picture. */

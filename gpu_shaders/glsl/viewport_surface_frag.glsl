@@ -29,7 +29,7 @@ void main()
 {
   int index = int(surface_triangle + 0.5);
 #ifdef HAS_ALPHA
-  if (element(triangle_corners, 3 * index + 1).w != 0.0 && is_hole(index, surface_barycentric)) {
+  if ((int(element(triangle_corners, 3 * index + 1).w) & 1) != 0 && is_hole(index, surface_barycentric)) {
     discard;
   }
 #endif
@@ -50,6 +50,7 @@ void main()
     }
     Surface surface = resolve_surface(index, surface_barycentric, eye, direction, view_info[3].w);
     float distance = length(surface.position - eye);
-    radiance_sum = vec4(shade_surface(surface, direction, distance, pixel_key(ivec2(gl_FragCoord.xy)), sample_index), 1.0);
+    uvec3 key = pixel_key(ivec2(gl_FragCoord.xy));
+    radiance_sum = vec4(shade_surface(surface, index, direction, distance, key, sample_index), 1.0);
   }
 }

@@ -179,6 +179,52 @@ def test_light_on_a_wall(gpu_context, name):
     check(scene)
 
 
+IES = "IESNA:LM-63-1995\nTILT=NONE\n1 1000 1 7 1 1 2 0 0 0\n1 1 100\n0 15 30 45 60 75 90\n0\n1000 950 700 300 80 10 0\n"
+
+
+def with_nodes(lamp, kind, **inputs):
+    """The strength of ``lamp`` comes from a node of ``kind``; returns it."""
+    lamp.data.use_nodes = True
+    tree = lamp.data.node_tree
+    tree.nodes.clear()
+    node, glow, out = (tree.nodes.new(name) for name in (kind, "ShaderNodeEmission", "ShaderNodeOutputLight"))
+    tree.links.new(glow.outputs[0], out.inputs["Surface"])
+    for name, value in inputs.items():
+        node.inputs[name].default_value = value
+    return node, glow.inputs["Strength"], tree.links
+
+
+@pytest.mark.parametrize("output", ["Linear", "Constant"])
+@pytest.mark.any_version
+def test_falloff_of_a_lamp(gpu_context, output):
+    scene = wall_and_screen(output)
+    lamp = scenes.add_light(scene, "POINT", BEHIND, energy=20, shadow_soft_size=0.1)
+    falloff, strength, links = with_nodes(lamp, "ShaderNodeLightFalloff", Strength=1.0)
+    links.new(falloff.outputs[output], strength)
+    check(scene)
+
+
+@pytest.mark.any_version
+def test_lamp_that_shines_to_one_side(gpu_context):
+    scene = wall_and_screen("Side")
+    lamp = scenes.add_light(scene, "POINT", BEHIND, SLANTED, energy=20, shadow_soft_size=0.1)
+    direction, strength, links = with_nodes(lamp, "ShaderNodeTexCoord")
+    side = strength.node.id_data.nodes.new("ShaderNodeSeparateXYZ")
+    links.new(direction.outputs["Normal"], side.inputs[0])
+    links.new(side.outputs["Y"], strength)  # negative on the other side, as in Cycles
+    check(scene)
+
+
+def test_ies_profile_of_a_tilted_lamp(gpu_context):
+    scene = wall_and_screen("IES")
+    lamp = scenes.add_light(scene, "POINT", BEHIND, SLANTED, energy=20, shadow_soft_size=0.02)
+    profile, strength, links = with_nodes(lamp, "ShaderNodeTexIES")
+    profile.mode, profile.ies = "INTERNAL", bpy.data.texts.new("profile")
+    profile.ies.write(IES)
+    links.new(profile.outputs[0], strength)
+    check(scene)
+
+
 @pytest.mark.any_version
 def test_light_on_a_wall_two_kilometres_wide(gpu_context):
     scene = wall_and_screen("Huge", half_edge=1000.0)

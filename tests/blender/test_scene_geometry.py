@@ -7,6 +7,7 @@ import time
 import bpy
 import numpy as np
 import pytest
+from gridlight.core.snapshot import DIFFUSE_RAYS, SHADOW_RAYS
 from gridlight.scene.read import read_scene
 from mathutils import Matrix
 from scene_builders import empty_scene, image, material, mesh, node, place, quad, with_nodes
@@ -258,10 +259,18 @@ def test_what_has_no_surface_is_named(scene):
 
 def test_ray_visibility(scene):
     place(quad(), "reflection card", visible_diffuse=False, visible_shadow=False)
-    place(quad(), "half", visible_diffuse=False)
+    glow = material("glow", "ShaderNodeEmission")
+    for name, rays in (
+        ("both", {}),
+        ("no bounce", {"visible_diffuse": False}),
+        ("no shadow", {"visible_shadow": False}),
+    ):
+        place(quad(), name, **rays).data.materials.append(glow)
     snapshot = read_scene(scene)
-    assert snapshot.object_names == ["half"]
-    assert any("ray visibility" in line and "'half'" in line for line in snapshot.warnings)
+    assert snapshot.object_names == ["both", "no bounce", "no shadow"] and not snapshot.warnings
+    rows = [snapshot.materials[index] for index in snapshot.material_index[::2]]
+    assert [row.unseen_by for row in rows] == [0, DIFFUSE_RAYS, SHADOW_RAYS]
+    assert [any(row.emission) for row in rows] == [True, False, True], "what no diffuse ray meets lights nothing"
 
 
 def test_a_mesh_that_is_being_edited_is_read_as_it_is_now(scene):

@@ -204,6 +204,47 @@ def test_mix_and_add_shaders(scene):
     assert read_material.emission == pytest.approx((0.5, 0.5, 0.5))
 
 
+def test_translucent_lets_light_through(scene):
+    """Alone, mixed, added, and beside holes: what is sent back in all, and the share that has gone through."""
+
+    def shader(tree, way):
+        diffuse = node(tree, "ShaderNodeBsdfDiffuse", {"Color": (0.4, 0.2, 0.6, 1)}).outputs[0]
+        through = node(tree, "ShaderNodeBsdfTranslucent", {"Color": (0.4, 0.6, 0.0, 1)}).outputs[0]
+        hole = node(tree, "ShaderNodeBsdfTransparent").outputs[0]
+        if way == "alone":
+            return through
+        if way == "added":
+            return node(tree, "ShaderNodeAddShader", {"Shader": diffuse, "Shader_001": through}).outputs[0]
+        if way == "beside holes":
+            return node(tree, "ShaderNodeMixShader", {"Fac": 0.5, "Shader": hole, "Shader_001": through}).outputs[0]
+        return node(tree, "ShaderNodeMixShader", {"Fac": 0.25, "Shader": diffuse, "Shader_001": through}).outputs[0]
+
+    for way, color, share, alpha in (
+        ("alone", (0.4, 0.6, 0.0), (1, 1, 1), 1),
+        ("added", (0.8, 0.8, 0.6), (0.5, 0.75, 0), 1),
+        ("mixed", (0.4, 0.3, 0.45), (0.25, 0.5, 0), 1),
+        ("beside holes", (0.4, 0.6, 0.0), (1, 1, 1), 0.5),
+    ):
+        made, snapshot = read(empty_scene(), built(lambda tree, way=way: shader(tree, way)))
+        assert made.base_color == pytest.approx(color) and made.transmitted == pytest.approx(share), way
+        assert made.alpha == pytest.approx(alpha) and not snapshot.warnings
+
+
+def test_a_pattern_of_translucency_enters_with_its_mean(scene):
+    """One image for both parts keeps it, as they differ by a factor; another one does not, and says so."""
+
+    def shader(tree, shared):
+        color = textured(tree, pixels=OPAQUE)
+        diffuse = node(tree, "ShaderNodeBsdfDiffuse", {"Color": color}).outputs[0]
+        through = node(tree, "ShaderNodeBsdfTranslucent", {"Color": color if shared else (0.2, 0.4, 0.2, 1)}).outputs[0]
+        return node(tree, "ShaderNodeMixShader", {"Fac": 0.25, "Shader": diffuse, "Shader_001": through}).outputs[0]
+
+    for shared, share in ((True, (0.25, 0.25, 0.25)), (False, (0.25, 0.25, 0.1))):
+        made, snapshot = read(empty_scene(), built(lambda tree, shared=shared: shader(tree, shared)))
+        assert made.transmitted == pytest.approx(share, abs=0.01) and made.base_image != NO_IMAGE
+        assert warned(snapshot, "translucency", "'Subject'") != shared
+
+
 def test_glossy_keeps_its_energy_and_says_so(scene):
     read_material, snapshot = read(
         scene, material("Chrome", "ShaderNodeBsdfAnisotropic", {"Color": (0.9, 0.8, 0.7, 1), "Roughness": 0.1})

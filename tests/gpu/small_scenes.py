@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 from gridlight.bake.job import run_bake
 from gridlight.core import lookup
+from gridlight.core.light_profiles import DISTANCES_M, HEIGHT, WIDTH, LightProfile
+from gridlight.core.panorama import panorama_directions
 from gridlight.core.sampling import tangent_frame
 from gridlight.core.snapshot import DITHERED, Image, Light, Material, SceneSnapshot, World
 
@@ -98,6 +100,13 @@ def frame(position=(0, 0, 0), towards=(0, 0, -1)):
     return matrix
 
 
+def some_profile():
+    """Bright below, dim and red above, fading more slowly than by the square."""
+    z = panorama_directions(WIDTH, HEIGHT)[..., 2:]
+    by_direction = np.where(z < 0, 1.0 - z, [0.5, 0.1, 0.0]) * (1 + 0.5 * np.sin(np.arange(WIDTH) / 3))[:, None]
+    return LightProfile(by_direction.astype(np.float32), DISTANCES_M**0.7)
+
+
 def all_lights():
     """One light of every kind and every variant of its formula."""
     color = (3.0, 2.0, 1.0)
@@ -134,6 +143,9 @@ def all_lights():
         ),
         "spread": Light(
             "spread", "AREA", color, frame((-0.1, 0.3, 0.9), (0, 0.2, -1)), size_x=0.3, size_y=0.3, spread=1.5
+        ),
+        "profiled": Light(
+            "profiled", "POINT", color, frame((-0.3, -0.5, 0.6), (0.3, 0.4, -0.9)), radius=0.1, profile=some_profile()
         ),
         "shadowless": Light("shadowless", "POINT", color, frame((-0.3, 0.5, -0.6)), casts_shadow=False),
     }

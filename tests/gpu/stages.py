@@ -10,10 +10,10 @@ from gridlight.core.conventions import INVALID
 from gridlight.core.cubemap import octahedral_decode
 from gridlight.core.field import Field
 from gridlight.core.orientation import inside_solid
-from gridlight.core.patches import POINTS
 from gridlight.core.reference_bake import ReferenceBake
 from gridlight.core.reference_scene import Surfaces
 from gridlight.gpu_shaders.backend import GpuBackend
+from gridlight.gpu_shaders.places import Places
 from gridlight.gpu_shaders.textures import allocate, numbers, read, upload
 from shader_runner import read_layers, run
 
@@ -35,8 +35,9 @@ class PatchesOfGpu:
     def __init__(self, finder):
         self._finder = finder
 
-    def bind_ends(self, hits, round_, sees):
-        bound = self._finder.bind_ends(upload(hits, "test"), len(hits), round_)
+    def bind_ends(self, hits, round_, sees, sheets):
+        sheets = numbers(sheets, "test") if self._finder.places.sheets is not None else None
+        bound = self._finder.bind_ends(Places(upload(hits, "test"), 1, sheets), len(hits), round_)
         return read(bound, len(hits), channels=1)[:, 0].astype(int)
 
 
@@ -100,7 +101,7 @@ class Stages:
 
     def hits(self):
         """(P·X, 4) position and packed normal of texels."""
-        return read(self.hits_texture(), self.gpu.count * 6 * self.settings.face**2)
+        return read(self.hits_texture().points, self.gpu.count * 6 * self.settings.face**2)
 
     def irradiance_at_texels(self, samples):
         """(P, X, 3) direct light of each texel by itself, 0 where nothing reflects."""
@@ -108,7 +109,7 @@ class Stages:
         count = self.gpu.count * 6 * self.settings.face**2
         direct = allocate(count, "test")
         lit = np.flatnonzero(self.hits()[:, 3] >= 0)
-        steps.run(self.light._direct.light(hits, 1, numbers(lit, "test"), [(0, len(lit), samples)], direct))
+        steps.run(self.light._direct.light(hits, numbers(lit, "test"), [(0, len(lit), samples)], direct))
         return read(direct, count)[:, :3].reshape(self.gpu.count, -1, 3)
 
     # Patches
@@ -118,6 +119,11 @@ class Stages:
     def points(self):
         """(N, POINTS, 4)"""
         return self.light.patches.read_points()
+
+    @property
+    def sheets(self):
+        """(N,) sheets that patches are part of."""
+        return read(self.light.patches.places.sheets, self.light.count, channels=1)[:, 0].astype(int)
 
     def sees_leader(self, hits, patches):
         """(H,) the GPU's word on which ``hits`` (H, 4) see the leader of their patch (H,)."""
@@ -140,7 +146,7 @@ class Stages:
     def spread(self, part):
         """(2, N) how unevenly ``part`` of the light lights the patches."""
         result = allocate(self.light.count, "test", "RG32F")
-        self.light._direct.find_spread(part, self.light.patches.points, 0, self.light.count, result)
+        self.light._direct.find_spread(part, self.light.patches.places, 0, self.light.count, result)
         return read(result, self.light.count, channels=2).T
 
     def direct_of(self, patches, samples):
@@ -148,7 +154,7 @@ class Stages:
         direct = allocate(self.light.count, "test")
         chosen = numbers(patches, "test")
         lists = [(0, len(patches), samples)]
-        steps.run(self.light._direct.light(self.light.patches.points, POINTS, chosen, lists, direct))
+        steps.run(self.light._direct.light(self.light.patches.places, chosen, lists, direct))
         return read(direct, self.light.count)[patches, :3].astype(float)
 
     def direct(self):
@@ -160,10 +166,10 @@ class Stages:
         """hits (C, R, 4), brought (C, 3), reflected (C, R, 3) of ``count`` patches from ``first``."""
         stop = first + count
         reflected, brought = allocate(stop * rays_each, "test"), allocate(stop, "test")
-        points = self.light.patches.points
-        found = self.light._trace(points, POINTS, first, count, rays_each, reflected, brought, segments)
+        places = self.light.patches.places
+        found = self.light._trace(places, first, count, rays_each, reflected, brought, segments)
         return (
-            read(found.hits, count * rays_each).reshape(count, rays_each, 4),
+            read(found.hits.points, count * rays_each).reshape(count, rays_each, 4),
             read(brought, stop)[first:, :3],
             read(reflected, stop * rays_each)[first * rays_each :, :3].reshape(count, rays_each, 3),
         )

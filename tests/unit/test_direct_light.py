@@ -5,6 +5,8 @@ otherwise."""
 import numpy as np
 import pytest
 from gridlight.core import direct_light
+from gridlight.core.light_profiles import DISTANCES_M, HEIGHT, WIDTH, LightProfile
+from gridlight.core.panorama import panorama_directions
 from gridlight.core.sampling import sample_r2
 from gridlight.core.snapshot import Light
 
@@ -181,3 +183,15 @@ def test_tangent_frames_are_orthonormal():
     axes = np.concatenate([axes / np.linalg.norm(axes, axis=1, keepdims=True), np.eye(3), -np.eye(3)])
     frames = np.stack([*direct_light.tangent_frame(axes), axes], axis=1)
     np.testing.assert_allclose(frames @ frames.transpose(0, 2, 1), np.tile(np.eye(3), (len(axes), 1, 1)), atol=1e-9)
+
+
+def test_profile_of_a_lamp():
+    """By direction in the lamp's own frame, and a power law of the distance, also past the ends of its curve."""
+    z = panorama_directions(WIDTH, HEIGHT)[..., 2:]
+    downwards = LightProfile(np.where(z < 0, [1.0, 0.5, 0.25], 0.0), DISTANCES_M**0.5)
+    for distance in (0.1, 1.0, 3.0, 300.0):
+        below = irradiance(light("POINT", (0, 0, distance), direction=(0, 0, -1), profile=downwards), samples=1)
+        np.testing.assert_allclose(below, COLOR * [1.0, 0.5, 0.25] * distance**-1.5, rtol=1e-6)
+    turned = light("POINT", (0, 0, 2), direction=(0, 0, 1), profile=downwards)
+    assert not irradiance(turned, samples=1).any(), "it sends its light up"
+    assert LightProfile(z, z[0, :5, 0]) != downwards == LightProfile(downwards.by_direction, DISTANCES_M**0.5)
