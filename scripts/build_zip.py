@@ -84,16 +84,17 @@ def fetch_wheels(names: list[str]) -> None:
         path = WHEELS / name
         if path.exists() and _sha256(path) in pinned:
             continue
-        path.unlink(missing_ok=True)
         _, _, python, abi, platform = path.stem.split("-")
         options = ["--python-version", python.removeprefix("cp"), "--implementation", "cp", "--abi", abi]
         options += ["--platform", platform, "--only-binary", ":all:", "--no-deps", "--require-hashes"]
         command = [sys.executable, "-I", "-m", "pip", "--disable-pip-version-check", "--no-input", "download", "-q"]
-        done = subprocess.run(
-            [*command, *options, "-r", str(PINS), "-d", str(WHEELS)], stdout=sys.stderr.fileno(), check=False
-        )
-        if done.returncode or not path.exists():
-            raise BuildError(f"pip cannot fetch {name}; the lines above say why. Check the network and {PINS}")
+        with tempfile.TemporaryDirectory(dir=WHEELS) as folder:  # whole or not at all: another build may look for it
+            done = subprocess.run(
+                [*command, *options, "-r", str(PINS), "-d", folder], stdout=sys.stderr.fileno(), check=False
+            )
+            if done.returncode or not Path(folder, name).exists():
+                raise BuildError(f"pip cannot fetch {name}; the lines above say why. Check the network and {PINS}")
+            Path(folder, name).replace(path)
 
 
 def _copy_source(target: Path) -> None:
