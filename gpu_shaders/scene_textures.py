@@ -7,11 +7,14 @@ float32.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import gpu
 import numpy as np
 
 from ..core import bvh, emitters
 from ..core.errors import InputError
+from ..core.light_profiles import LightProfile
 from ..core.scene_changes import SceneChanges, ShapeChange, boxes_around
 from ..core.sheets import sheet_numbers
 from ..core.snapshot import Light, SceneSnapshot
@@ -109,13 +112,7 @@ class SceneTextures:
     def _send_lights(self) -> None:
         """Lamps, suns, and what nodes make of lamps' light."""
         rows = np.concatenate([self._lights, self._suns])
-        parts, end = [rows.reshape(-1, 4)], 6 * len(rows)
-        for row, profile in zip(rows, self._profiles):
-            if profile is not None:
-                row[5, 3] = end
-                parts.append(profile.rows())
-                end += len(parts[-1])
-        self._textures["lights"] = upload(np.concatenate(parts), "lights")
+        self._textures["lights"] = upload(with_profiles(rows, self._profiles), "lights")
 
     def _build(self, snapshot: SceneSnapshot) -> None:
         corners = (snapshot.triangle_positions - self._origin).astype(np.float32)
@@ -193,6 +190,7 @@ class SceneTextures:
             "HAS_ALPHA": self.has_alpha,
             "HAS_IMAGES": self.has_images,
             "HAS_UNSEEN": self.has_unseen,
+            "HAS_PROFILES": any(profile is not None for profile in self._profiles),
             "STACK_SIZE": stack_size,
             "LEAN_STACK": gpu.platform.device_type_get() != "SOFTWARE",
         }
@@ -354,3 +352,16 @@ def pack_lights(lights: list[Light], origin: np.ndarray) -> np.ndarray:
                 cosine = np.cos(light.spot_size / 2)
                 row[5, :2] = cosine, 1 / max((1 - cosine) * light.spot_blend, 1e-6)
     return rows
+
+
+def with_profiles(rows: np.ndarray, profiles: Sequence[LightProfile | None]) -> np.ndarray:
+    """(N, 4) elements of direct_light_lib's lights: ``rows`` (lights, 6, 4), with what nodes make of the light of the
+    first of them after all."""
+    rows = rows.copy()
+    end, parts = 6 * len(rows), []
+    for row, profile in zip(rows, profiles):
+        if profile is not None:
+            row[5, 3] = end
+            parts.append(profile.rows())
+            end += len(parts[-1])
+    return np.concatenate([rows.reshape(-1, 4), *parts])

@@ -3,12 +3,14 @@
  *
  * lights, 6 elements each (scene_textures.py):
  *   position, kind | color, radius | right, size x | up, size y | back, casts shadow | parameters of the kind, profile
- * After all lights their profiles (core/light_profiles.py), PROFILE_WIDTH × PROFILE_HEIGHT directions and PROFILE_DISTANCES logarithms each;
+ * With HAS_PROFILES, after all lights their profiles (core/light_profiles.py), PROFILE_WIDTH × PROFILE_HEIGHT directions and PROFILE_DISTANCES logarithms each;
  * a light's profile is the first element of its own, 0 for none.
  */
 
+#ifdef HAS_PROFILES
 const int PROFILE_WIDTH = 64, PROFILE_HEIGHT = 32, PROFILE_DISTANCES = 5;
 const float LEAST_PROFILE_DISTANCE = 0.25; /* metres; each is four times the one before */
+#endif
 
 #ifndef FIRST_LIGHT
 #define FIRST_LIGHT 0
@@ -32,6 +34,7 @@ float spot_mask(int light, vec3 towards, vec3 back, vec4 parameters)
   return x * x * (3.0 - 2.0 * x);
 }
 
+#ifdef HAS_PROFILES
 /* What a light's nodes make of the light that goes from it along `direction`, by which it is seen, over `distance`. */
 vec3 profile_factor(int light, int profile, vec3 direction, float distance)
 {
@@ -52,6 +55,7 @@ vec3 profile_factor(int light, int profile, vec3 direction, float distance)
   int curve = profile + PROFILE_WIDTH * PROFILE_HEIGHT + first;
   return factor * exp2(mix(element(lights, curve).x, element(lights, curve + 1).x, along - float(first)));
 }
+#endif
 
 LightSample sample_plain_light(int light, vec3 point, vec2 u)
 {
@@ -135,10 +139,12 @@ LightSample sample_plain_light(int light, vec3 point, vec2 u)
 LightSample sample_light(int light, vec3 point, vec2 u)
 {
   LightSample light_sample = sample_plain_light(light, point, u);
+#ifdef HAS_PROFILES
   int profile = int(element(lights, 6 * light + 5).w);
   if (profile > 0) {
     light_sample.irradiance *= profile_factor(light, profile, light_sample.direction, light_sample.distance);
   }
+#endif
   return light_sample;
 }
 

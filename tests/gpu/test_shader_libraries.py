@@ -187,14 +187,15 @@ def test_direct_light(name):
     blocker = np.array([[[-0.5, -0.5, 0.45], [0.6, -0.4, 0.5], [0.0, 0.7, 0.55]]], np.float32)
     scene = RayScene(blocker)
     places = np.random.default_rng(6).random((4000, 2)).astype(np.float32)
-    lamp = textures.upload(scene_textures.pack_lights([light], ORIGIN), "lights")
+    rows = scene_textures.pack_lights([light], ORIGIN)
+    lamp = textures.upload(scene_textures.with_profiles(rows, [light.profile]), "lights")
     found = run(
         "lights",
         4000,
         libraries=["data_lib", "random_lib", "offset_lib", "ray_lib", "direct_light_lib"],
         inputs={"points": points, "normals": normals, "places": places},
         textures_2d={**scene.textures, "lights": lamp},
-        defines={**scene.defines, "light_count": 1},
+        defines={**scene.defines, "light_count": 1} | ({"HAS_PROFILES": ""} if light.profile else {}),
     )[:, :3]
 
     def visible(origins, directions, limits):
