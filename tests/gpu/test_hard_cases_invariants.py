@@ -33,7 +33,10 @@ KEPT = [
     ("sum of sources", Spec(619379841, "cube inside out", 2, ("AREA", "AREA"), True, True, "single")),
     ("quarter turn", Spec(2026532569, "cube inside out", 0, ("SUN",), True, False, "sheared")),
     ("quarter turn", Spec(15686, "no ceiling", 1, ("SUN",), False, False, "turned")),
+    ("sum of sources", Spec(1660245964, "slabs", 1, ("AREA", "SUN"), False, True, "turned")),
 ]
+SEEDS = 8  # of bakes whose mean tells chance from a fault
+SURE = 2.0  # standard errors
 
 
 def fields_of(result):
@@ -90,21 +93,40 @@ def check_sum(spec):
             replace(light, color=tuple(float(s) * c for c in light.color)) for light, s in zip(snapshot.lights, shares)
         ]
         parts.append(replace(part, lights=lamps))
-    whole, parts = base.field, [bake(part, grid, SETTINGS).field for part in parts]
-    for part in parts:
-        np.testing.assert_array_equal(part.state, whole.state)
-        np.testing.assert_array_equal(part.offset, whole.offset)
-    total = sum(part.coefficients.astype(float) for part in parts)
+
+    def total_and_whole(seed):
+        choice = replace(SETTINGS, seed=seed)
+        whole = bake(snapshot, grid, choice).field if seed else base.field
+        first, second = (bake(part, grid, choice).field for part in parts)
+        for part in (first, second):
+            np.testing.assert_array_equal(part.state, whole.state)
+            np.testing.assert_array_equal(part.offset, whole.offset)
+        return first.coefficients.astype(float) + second.coefficients, whole.coefficients
+
     # Patches get more samples of a lamp where it is uneven beside all light there is: other noise, not other light.
-    np.testing.assert_allclose(total, whole.coefficients, atol=0.1 * np.abs(total).max())
-    assert np.sqrt(((total - whole.coefficients) ** 2).sum() / max((total**2).sum(), 1e-30)) <= 4e-2
+    assert difference(total_and_whole, 4e-2) <= 4e-2
+
+
+def difference(pair, limit):
+    """Relative RMS by which the two arrays of ``pair(seed)`` differ, apart from chance: more than ``limit`` has to be
+    there in the mean over SEEDS seeds, beyond SURE standard errors of that mean by their spread, which excuse as much
+    again at most."""
+    pairs = [pair(0)]
+    scale = np.sqrt(max((pairs[0][1].astype(float) ** 2).sum(), 1e-30))
+    single = float(np.sqrt(((pairs[0][0] - pairs[0][1]) ** 2).sum()) / scale)
+    if single <= limit:
+        return single
+    apart = np.array([first - second for first, second in pairs + [pair(seed) for seed in range(1, SEEDS)]])
+    chance = np.sqrt(apart.var(axis=0, ddof=1).sum() / SEEDS) / scale
+    return float(np.sqrt((apart.mean(axis=0) ** 2).sum()) / scale) - min(SURE * chance, limit)
 
 
 def check_turn(spec):
     """The field turns with the scene, up to chance: cubes of probes stand askew, so after a quarter turn texels,
     patches and rays all lie elsewhere. Returns by how much it does not, which over many scenes has to be little; None
     where a wall decides by rounding, or where next to nothing of the lamps gets in, as of a sun that shines from
-    beneath: specks that few rays find."""
+    beneath on the tip of a thing that looks over a wall: a speck, of which texels have more or less as they lie (seed
+    15686: factors of two with faces of 32²; at 128² either way is what paths find)."""
     if spec.volume == "on the walls":
         return None
     snapshot, grid = spec.build()
@@ -210,10 +232,18 @@ def test_invariant(check, spec):
     CHECKS[check](spec)
 
 
+@pytest.fixture
+def few_rays(monkeypatch):
+    """No more rays than asked for: little of this is about noise."""
+    monkeypatch.setattr(patches, "_MANY", 1)
+    as_it_is.cache_clear()
+    yield
+    as_it_is.cache_clear()
+
+
 @pytest.mark.nightly
 @pytest.mark.parametrize("piece", range(PIECES))
-def test_invariants_on_five_hundred_scenes(piece, monkeypatch):
-    monkeypatch.setattr(patches, "_MANY", 1)  # no more rays than asked for: little of this is about noise
+def test_invariants_on_five_hundred_scenes(piece, few_rays):
     broken, seen, turned = [], set(), []
 
     @settings(some, max_examples=SCENES_EACH)
@@ -238,5 +268,5 @@ def test_invariants_on_five_hundred_scenes(piece, monkeypatch):
 
 
 @pytest.mark.parametrize("check, spec", KEPT, ids=str)
-def test_scenes_that_failed_once(check, spec):
+def test_scenes_that_failed_once(check, spec, few_rays):
     CHECKS[check](spec)
