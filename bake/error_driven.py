@@ -19,38 +19,38 @@ import numpy as np
 
 from ..core import adaptive_bands, lookup
 from ..core.conventions import ACTIVE
-from ..core.error_budget import ErrorGoal, ErrorModel, Level, first_level, next_level, worst_probes
+from ..core.error_budget import ErrorGoal, ErrorModel, Level, cost_of_paths, first_level, next_level, worst_probes
 from ..core.field import Field
 from ..core.grid import Grid
-from ..core.path_check import MOST_BANDS, NORMALS, PathCheck, SquaredError, irradiance_of
+from ..core.path_check import MOST_BANDS, NORMALS, SquaredError, irradiance_of
 from ..core.probe_edits import ProbeEdits
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..core.steps import Pace, Steps
-from ..gpu_shaders.probe_paths import ProbePaths
 from ..gpu_shaders.scene_textures import SceneTextures
 from .block_session import AnySession, open_session
 from .deringing import dering_field
+from .followed_paths import FollowedPaths
 from .passes import Passes
 from .result import BakeResult, Reporter
 from .session import BakeSession
 from .stopwatch import Stopwatch
 
 _CHECKED = 64  # probes from which paths are followed
-_BETWEEN = 48  # places between probes
-_FIRST_PATHS, _MOST_PATHS = 256, 2048  # of each place and set
-_DECIDED = 1.0  # standard errors between an error and its target: what a bake is held to, so more would not help
+_BETWEEN = 32  # places between probes
+_FIRST_PATHS, _MOST_PATHS = 64, 1024  # of each place and set
+_MOST_CHECK = 2.0  # of the cost of all bakes: what paths may cost
 _BLURRED = 0.3  # of the standard error: less is not the paths' doing, but the spread between probes
 _SURE = 1.0  # standard errors by which a bake has to be below its target
-_MARGIN = 0.7  # of the squared error that is left to spend: levels aim below it
+_LOST = 2.0  # standard errors by which it is held to be above: few paths carry most light and may come too early
+_LEAST_AIM, _MOST_AIM = 0.3, 0.7  # of the squared error that the target leaves: between these, levels aim below it
 _NEAR_FLOOR = 0.6  # where the bands alone miss the target, the rest is brought below this share of what they lose
 _GIVEN_UP = 0.25  # of the squared error that is left when the target is met: upper bands that may go
 _TAIL = 0.2  # of the target: light that may be missing when iterations stop
 _MOST_PASSES = 6
-_MOST_COST = 30.0  # in first bakes: what all of them may cost
+_MOST_COST, _MOST_IN_VAIN = 12.0, 4.0  # in first bakes: what all may cost, and where bands alone miss the target
 _MOST_STEP = 3.0  # times what was spent so far: what one more may cost
 _SEED_STEP = 7919  # between passes
-_PATH_SEEDS = 0x5EED, 0xF1E1D  # of the two sets, besides the bake's own
 _BEHIND = 0.25  # of back faces in sight: more, and a place is inside something
 
 
@@ -128,8 +128,8 @@ class ErrorDrivenBake:
         random = np.random.default_rng(self._settings.seed)
         self._checked = np.sort(random.permutation(self._active)[:_CHECKED])
         positions = (self.grid.positions() + self._field.offset)[self._checked]
-        self._paths = self._paths_from(positions)
-        self._check = PathCheck(len(self._checked))
+        self._paths = self._paths_from(positions, drawn_from=len(self._active))
+        self._check = self._paths.check
         self._model = ErrorModel()
         why = ""
         while True:
@@ -137,18 +137,19 @@ class ErrorDrivenBake:
             if not self._check.scale:
                 self._finish(None, "no light reaches the probes, there is no error to relate to it")
                 return
-            error = self._error()
-            own = self._check.error_in_bands(self._light.mean[self._checked])
-            self._model.add(self._level, max(own.value, own.noise))
+            error, own, wanted = self._error(), self._own_error(), self._wanted()
             self._reporter.note(
                 f"{self._passes[-1]}: {100 * error.estimate:.2g} % from paths at {len(self._checked)} probes "
                 f"(up to {100 * error.bound(_SURE):.2g} %), the bands alone {100 * np.sqrt(self._floor()):.2g} %"
             )
             if error.bound(_SURE) <= self.goal.target:
                 break
-            wanted = self._wanted()
-            if own.value <= wanted and self._floor() > (_NEAR_FLOOR * self.goal.target) ** 2:
+            floor, left = self._floor(), self.goal.target**2 - self._floor()
+            if own.value <= max(wanted, own.noise) and floor > (_NEAR_FLOOR * self.goal.target) ** 2:
                 why = "what the bands cannot say"
+                break
+            if not self._decided() and error.deviation > _MOST_AIM * left > 0:
+                why = "what paths can tell"
                 break
             level = self._next(wanted)
             if level is None or len(self._passes) > _MOST_PASSES:
@@ -159,17 +160,28 @@ class ErrorDrivenBake:
         self._finish(error, why)
 
     def _wanted(self) -> float:
-        """Squared error within the bands to aim for."""
+        """Squared error within the bands to aim for: below what the target leaves beside the bands' floor, by what
+        paths cannot tell."""
         floor = self._floor()
-        return max(_MARGIN * (self.goal.target**2 - floor), _NEAR_FLOOR**2 * floor, 1e-8)
+        left = self.goal.target**2 - floor
+        aim = np.clip(left - _SURE * self._error().deviation, _LEAST_AIM * left, _MOST_AIM * left)
+        return max(float(aim), _NEAR_FLOOR**2 * floor, 1e-8)
 
     def _floor(self) -> float:
         """Squared error that the bands alone make."""
         return max(self._check.floor(self._settings.bands).value, 0.0)
 
+    def _own_error(self) -> SquaredError:
+        """Squared error within the bands of all that was baked, which the model is told."""
+        own = self._check.error_in_bands(self._light.mean[self._checked])
+        self._model.set(self._level, max(own.value, own.noise))
+        return own
+
     def _next(self, wanted: float) -> Level | None:
+        """The level to go to, by what the model knows."""
         probes = len(self._active)
-        all_of_it = _MOST_COST * first_level(self.goal, self._settings.face, self._settings.samples).cost(probes)
+        first = first_level(self.goal, self._settings.face, self._settings.samples).cost(probes)
+        all_of_it = (_MOST_COST if self._floor() < self.goal.target**2 else _MOST_IN_VAIN) * first
         most = min(all_of_it - self._spent, _MOST_STEP * self._spent)
         return next_level(self._model, self._level, wanted, self.goal.kept, probes, most)
 
@@ -179,38 +191,40 @@ class ErrorDrivenBake:
         return self._check.error(irradiance_of(field.coefficients[self._checked], NORMALS))
 
     def _follow_paths(self) -> Steps[None]:
-        """More paths, twice as many each time, until they tell which side of the target the error lies on."""
+        """More paths, twice as many each time, until they tell which side of the target the error lies on, or a finer
+        bake that would be farther below it is cheaper than as many again."""
         self._reporter.phase("error")
         while True:
-            if self._check.paths:
-                error = self._error()
-                apart = abs(max(error.value, 0.0) - self.goal.target**2)
-                undecided = apart < _DECIDED * max(error.noise, error.deviation)
-                more_helps = error.noise > _BLURRED * error.deviation
-                if not (undecided and more_helps) or self._check.paths >= _MOST_PATHS:
-                    return
-            yield from self._add_paths(self._paths, self._check, max(self._check.paths, _FIRST_PATHS))
+            if self._check.paths and (self._decided() or self._too_dear() or self._finer_is_cheaper()):
+                return
+            yield from self._paths.follow(max(self._check.paths, _FIRST_PATHS))
 
-    def _paths_from(self, places: np.ndarray) -> ProbePaths:
+    def _decided(self) -> bool:
+        """Whether the error is known to be on one side of the target, or as well as paths can tell."""
+        error, target = self._error(), self.goal.target**2
+        is_met, is_lost = error.bound(_SURE) ** 2 <= target, error.value - _LOST * error.deviation > target
+        return is_met or is_lost or error.noise <= _BLURRED * error.deviation
+
+    def _too_dear(self) -> bool:
+        """Whether twice the paths would be too many."""
+        too_many = 2 * self._check.paths > _MOST_PATHS
+        return too_many or cost_of_paths(2 * self._paths.count) > _MOST_CHECK * self._spent
+
+    def _finer_is_cheaper(self) -> bool:
+        """Than to double the paths."""
+        self._own_error()
+        wanted = self._wanted()
+        level = self._next(wanted)
+        if level is None or self._model.predicted(level) > wanted:
+            return False
+        pay = level.beyond(self._level).cost(len(self._active))
+        return pay < cost_of_paths(self._paths.count)
+
+    def _paths_from(self, places: np.ndarray, drawn_from: int | None = None) -> FollowedPaths:
         """Paths from ``places`` (K, 3), world metres."""
         assert self._scene is not None  # it is there after the first pass
-        return ProbePaths(self._scene, self.snapshot, self.grid, places)
-
-    def _add_paths(self, paths: ProbePaths, check: PathCheck, count: int) -> Steps[np.ndarray]:
-        """Follows ``count`` more; returns (K,) the share of them that first meet a surface from behind."""
-        behind = np.zeros(paths.count)
-
-        def follow(start: int, number: int) -> None:
-            for half, seed in enumerate(_PATH_SEEDS):
-                directions, flux, share = paths.trace(
-                    check.paths + start, number, self._settings.bounces, (self._settings.seed + seed) & 0x7FFFFFFF
-                )
-                check.add(half, directions, flux)
-                behind[:] += share * number / (2 * count)
-
-        yield from self._stopwatch.steps("light", self._pace.portions("paths", count, follow))
-        check.paths += count
-        return behind
+        what = self._scene, self.snapshot, self.grid, places, self._settings, self._stopwatch, self._pace
+        return FollowedPaths(*what, drawn_from)
 
     # Refining
     # ------------------------------------------------------------------------------------------------------------------
@@ -218,8 +232,7 @@ class ErrorDrivenBake:
     def _refine(self, level: Level, wanted: float) -> Steps[None]:
         """Brings all probes, or those that need it, from the level they have to ``level``."""
         before = self._level
-        same_face = level.face == before.face
-        samples = level.samples - before.samples if same_face else level.samples
+        samples = level.beyond(before).samples
         settings = replace(
             self._settings,
             face=level.face,
@@ -270,15 +283,13 @@ class ErrorDrivenBake:
         """The error at random free places of the volume, which the target does not cover."""
         local = random.uniform(-1, 1, (4 * _BETWEEN, 3))
         points = local @ self.grid.matrix[:3, :3].T + self.grid.matrix[:3, 3]
-        paths = self._paths_from(points)
-        behind = yield from self._add_paths(paths, PathCheck(len(points)), 16)
+        behind = yield from self._paths_from(points).follow(2)
         points = points[behind <= _BEHIND][:_BETWEEN]
         if len(points):
-            check = PathCheck(len(points))
             paths = self._paths_from(points)
-            yield from self._add_paths(paths, check, _FIRST_PATHS)
-            if check.scale:
-                self._between = check.error(_read(self._light.field, points))
+            yield from paths.follow(_FIRST_PATHS // 2)
+            if paths.check.scale:
+                self._between = paths.check.error(_read(self._light.field, points))
 
     # The end
     # ------------------------------------------------------------------------------------------------------------------
@@ -364,7 +375,7 @@ class ErrorDrivenBake:
             },
             "between": round(between.estimate, 6) if between else None,
             "passes": self._passes,
-            "paths": 2 * self._check.paths * len(self._checked),
+            "paths": self._paths.count,
             "stopped": why,
         }
 

@@ -3,11 +3,12 @@
 
 The squared error of a bake within its bands is taken for the sum of three parts:
 
-    e² = a / face²  +  b / samples  +  c
+    e² = a / face³  +  b / samples  +  c
 
 texels that are too coarse, noise of rays and shadow rays, and what neither takes away (patches that are too large).
-Every bake that was checked is one equation for a, b and c. Until there are three, a guess fills the gap: with faces of
-14² and one sample, texels and noise do equally much harm, as they do in the gallery.
+An edge of light crosses as many texels as a face has along it, and each is off by a part of its own size, f⁻², by
+chance: the sum varies by f · f⁻⁴. Every bake that was checked is one equation for a, b and c. Until there are three, a
+guess fills the gap: with faces of 16² and one sample, texels and noise do equally much harm, as they do in some scenes.
 """
 
 from __future__ import annotations
@@ -20,13 +21,15 @@ import numpy as np
 from .errors import InputError
 
 LEAST_TARGET, MOST_TARGET = 1e-3, 1.0
+_FIRST_FACES = (0.08, 6), (0.05, 8), (0.035, 12), (0.015, 16), (0.0, 24)  # from which target on
 _FACES = (6, 8, 12, 16, 24, 32, 48, 64)
 _SAMPLES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
 _GUESS_WEIGHT = 0.3  # of the guess beside what was measured
-_GUESSED_RATIO = 200.0  # a / b
+_GUESSED_RATIO = 16.0**3  # a / b
 # Seconds of a bake, in those of what does not depend on any setting (docs/measurements.md, "Error-driven bakes").
-_COST_OF_TEXELS = 1.0 / 300 / 16**2  # per probe and squared texels of a face's edge
-_COST_OF_SAMPLES = 2.0
+_COST_OF_TEXELS = 5e-5  # per probe and squared texels of a face's edge
+_COST_OF_SAMPLES = 2.5
+_COST_OF_PATHS = 1.0 / 30000
 _MOST_OUTLYING = 4.0
 _LEAST_SHARE = 0.25
 
@@ -58,10 +61,20 @@ class Level:
         """Of one bake, in arbitrary units."""
         return 1.0 + _COST_OF_TEXELS * probes * self.face**2 + _COST_OF_SAMPLES * self.samples
 
+    def beyond(self, before: Level) -> Level:
+        """What to bake where ``before`` is there: samples of passes with the same face add up, another begins anew."""
+        return Level(self.face, self.samples - before.samples if self.face == before.face else self.samples)
+
+
+def cost_of_paths(count: int) -> float:
+    """Of following ``count`` paths, in the same units."""
+    return _COST_OF_PATHS * count
+
 
 def first_level(goal: ErrorGoal, face: int, samples: int) -> Level:
-    """What to begin with: cheap, or what the user keeps of ``face`` and ``samples``."""
-    small = 6 if goal.target >= 0.06 else 8 if goal.target >= 0.03 else 12
+    """What to begin with, which most scenes need no more than, or what the user keeps of ``face`` and ``samples``. A
+    bake far below its target costs less than the paths that find another to be a little below."""
+    small = next((face for least, face in _FIRST_FACES if goal.target >= least), _FIRST_FACES[-1][1])
     return Level(face if "face" in goal.kept else small, samples if "samples" in goal.kept else 1)
 
 
@@ -72,9 +85,12 @@ class ErrorModel:
     levels: list[Level] = field(default_factory=list)
     squared: list[float] = field(default_factory=list)
 
-    def add(self, level: Level, squared: float) -> None:
-        self.levels.append(level)
-        self.squared.append(max(squared, 1e-12))
+    def set(self, level: Level, squared: float) -> None:
+        """Notes what ``level`` was found to err; of one that is known already, what is known now."""
+        if not self.levels or self.levels[-1] != level:
+            self.levels.append(level)
+            self.squared.append(0.0)
+        self.squared[-1] = max(squared, 1e-12)
 
     def parts(self, level: Level) -> tuple[float, float, float]:
         """Squared errors at ``level`` by texels, by noise, and the rest."""
@@ -101,7 +117,7 @@ class ErrorModel:
 
 
 def _terms(level: Level) -> np.ndarray:
-    return np.array([1.0 / level.face**2, 1.0 / level.samples, 1.0])
+    return np.array([1.0 / level.face**3, 1.0 / level.samples, 1.0])
 
 
 def _non_negative(rows: np.ndarray, sides: np.ndarray) -> np.ndarray:
@@ -124,7 +140,7 @@ def next_level(
     model: ErrorModel, now: Level, wanted: float, kept: frozenset[str], probes: int, most_cost: float
 ) -> Level | None:
     """The cheapest level above ``now`` that should bring the squared error down to ``wanted``, or the one that comes
-    nearest to it within ``most_cost``; None where nothing helps by a tenth.
+    nearest to it within ``most_cost``; None where nothing does or helps by a tenth.
 
     Samples of passes with the same face add up, so that only what is missing is paid for; another face begins anew.
     """
@@ -136,15 +152,14 @@ def next_level(
             if (samples != now.samples and "samples" in kept) or (face == now.face and samples <= now.samples):
                 continue
             level = Level(face, samples)
-            pay = Level(face, samples - now.samples) if face == now.face else level
-            cost, squared = pay.cost(probes), model.predicted(level)
+            cost, squared = level.beyond(now).cost(probes), model.predicted(level)
             if cost <= most_cost:
                 enough = squared <= wanted
                 found.append((not enough, cost if enough else squared, cost, level))
     if not found:
         return None
-    best = min(found, key=lambda entry: entry[:3])[3]
-    return best if model.predicted(best) < 0.9 * model.predicted(now) else None
+    falls_short, *_, best = min(found, key=lambda entry: entry[:3])
+    return best if not falls_short or model.predicted(best) < 0.9 * model.predicted(now) else None
 
 
 def worst_probes(squared: np.ndarray, gain: float, wanted: float) -> np.ndarray:

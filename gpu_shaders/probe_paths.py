@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.grid import Grid
+from ..core.path_check import SETS
 from ..core.snapshot import SceneSnapshot
 from ..core.world_suns import extract_suns
 from .dispatch import dispatch_linear
@@ -34,24 +35,25 @@ class ProbePaths:
     def trace(
         self, first: int, count: int, bounces: int | None, seed: int
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Paths ``first`` .. ``first + count`` of the sequence that belongs to ``seed``, from every place.
+        """Paths ``first`` .. ``first + count`` of the sequences that belong to ``seed``, one a set, from every place.
 
         ``bounces``: how often light is reflected between surfaces before a place sees it; None for to its end.
-        Returns directions (K, 3·count, 3), radiance over density (K, 3·count, 3): divided by the number of paths, their
-        sum is the integral over the sphere; and (K,) the share of paths that first meet a surface from behind.
+        Returns directions (SETS, K, 3·count, 3), radiance over density of the same shape: divided by the number of
+        paths, the sum of a set is the integral over the sphere; and (K,) the share of paths that first meet a surface
+        from behind.
         """
         directions, flux, behind = [], [], np.zeros(self.count)
-        at_once = max(1, _PATHS_AT_ONCE // self.count)
+        at_once = max(1, _PATHS_AT_ONCE // (SETS * self.count))
         for start in range(first, first + count, at_once):
             part = min(at_once, first + count - start)
             towards, brought = self._trace(start, part, bounces, seed)
-            behind += towards[:, ::_PARTS, 3].sum(axis=1)
+            behind += towards[:, :, ::_PARTS, 3].sum(axis=(0, 2))
             directions.append(towards[..., :3])
             flux.append(brought)
-        return np.concatenate(directions, axis=1), np.concatenate(flux, axis=1), behind / count
+        return np.concatenate(directions, axis=2), np.concatenate(flux, axis=2), behind / (SETS * count)
 
     def _trace(self, first: int, count: int, bounces: int | None, seed: int) -> tuple[np.ndarray, np.ndarray]:
-        scene, paths = self._scene, self.count * count
+        scene, paths = self._scene, SETS * self.count * count
         defines = scene.surface_defines | scene.light_defines | scene.sheet_defines | {"HAS_IMAGES": scene.has_images}
         shader = program("probe_paths_comp", FACE=_FACE, **defines)
         directions, flux = (allocate(_PARTS * paths, "paths") for _ in range(2))
@@ -64,6 +66,7 @@ class ProbePaths:
         shader.image("flux_out", flux)
         for name, value in (
             ("path_count", paths),
+            ("probe_count", self.count),
             ("paths_each", count),
             ("first_number", first),
             ("first_sun", scene.light_count),
@@ -72,6 +75,6 @@ class ProbePaths:
         ):
             shader.uniform_int(name, (value,))
         dispatch_linear(shader, paths)
-        shape = (self.count, _PARTS * count, 4)
+        shape = (SETS, self.count, _PARTS * count, 4)
         elements = _PARTS * paths
         return read(directions, elements).reshape(shape), read(flux, elements).reshape(shape)[..., :3].astype(float)

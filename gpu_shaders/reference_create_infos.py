@@ -13,7 +13,9 @@ def probe_paths_comp(info, defines):
     _sheets(info, defines, slot)
     _image(info, 0, "directions")
     _image(info, 1, "flux_out")
-    _ints(info, "path_count", "paths_each", "first_number", "light_count", "first_sun", "bounces", "seed")
+    _ints(
+        info, "path_count", "probe_count", "paths_each", "first_number", "light_count", "first_sun", "bounces", "seed"
+    )
     info.local_group_size(64, 1, 1)
     files = [*_light_files(defines | {"HAS_ALPHA": True}), *_sheet_files(defines)]
     return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *files, "probe_paths_comp"]}

@@ -1,9 +1,10 @@
 /* Paths that leave probes in all directions and follow light to its end, whatever the bake made of it: an independent estimate of what the
  * probes should hold. No texel, patch or band is in it.
  *
- * Dispatch: one thread a path, paths_each a probe; groups of 64. Each writes three samples (direction, radiance over density) that together
- * estimate the light from everywhere: the path (density 1/4π), one point on the sampled emitters, one place on a sun of the world.
- * The path's first direction is stratified over the probe's paths; everything after it is independent (one shifted sequence for several
+ * Dispatch: one thread a path, paths_each for each series and probe, the probes of one series side by side; groups of 64. Each writes three
+ * samples (direction, radiance over density) that together estimate the light from everywhere: the path (density 1/4π), one point on the sampled
+ * emitters, one place on a sun of the world. Series are independent of each other (SETS in core/path_check.py). The path's first direction is stratified over a
+ * probe's paths of a series; everything after it is independent (one shifted sequence for several
  * bounces would be correlated between them). Directions carry in w whether the first surface is seen from behind.
  */
 
@@ -33,9 +34,10 @@ void main()
   if (entry >= path_count) {
     return;
   }
-  int probe = entry / paths_each;
-  int number = first_number + entry - probe * paths_each;
-  uvec3 key = uvec3(uint(probe), 0x9E3779B1u, uint(seed));
+  int row = entry / paths_each;
+  int number = first_number + entry - row * paths_each;
+  int series = row / probe_count, probe = row - series * probe_count;
+  uvec3 key = uvec3(uint(probe), 0x9E3779B1u, uint(seed) ^ (uint(series) * 0x85EBCA6Bu));
   uvec3 own_key = pcg3d(key + uvec3(0u, uint(number), 0u));
   vec3 start = element(probe_points, probe).xyz;
 

@@ -9,7 +9,7 @@ from gridlight.core.errors import InputError
 
 
 def error_of(level, texels, noise, rest=0.0):
-    return texels / level.face**2 + noise / level.samples + rest
+    return texels / level.face**3 + noise / level.samples + rest
 
 
 @pytest.mark.parametrize("target", [0.0, -0.1, 1.5, float("nan")])
@@ -18,17 +18,17 @@ def test_targets_out_of_range_are_refused(target):
         ErrorGoal(target)
 
 
-@pytest.mark.parametrize("texels, noise, rest", [(0.04, 0.0004, 0.0), (0.2, 1e-6, 0.0), (1e-4, 0.002, 1e-5)])
+@pytest.mark.parametrize("texels, noise, rest", [(0.6, 0.0004, 0.0), (3.0, 1e-6, 0.0), (1e-3, 0.002, 1e-5)])
 def test_the_model_finds_the_parts_of_errors_that_follow_it(texels, noise, rest):
     model = ErrorModel()
     for level in (Level(8, 1), Level(16, 1), Level(16, 4), Level(32, 2)):
-        model.add(level, error_of(level, texels, noise, rest))
+        model.set(level, error_of(level, texels, noise, rest))
     unseen = Level(24, 8)
     np.testing.assert_allclose(model.predicted(unseen), error_of(unseen, texels, noise, rest), rtol=1e-6)
-    np.testing.assert_allclose(model.parts(unseen)[0], texels / 24**2, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(model.parts(unseen)[0], texels / 24**3, rtol=1e-6, atol=1e-12)
 
 
-@pytest.mark.parametrize("texels, noise", [(0.1, 1e-5), (0.03, 0.0015), (0.05, 0.001), (0.02, 1e-4)])
+@pytest.mark.parametrize("texels, noise", [(1.5, 2.5e-4), (0.9, 1.5e-4), (0.6, 4e-5), (0.4, 0.0015)])
 @pytest.mark.parametrize("target", [0.03, 0.015, 0.008])
 def test_what_is_chosen_step_by_step_meets_the_target_for_little_more_than_the_best(texels, noise, target):
     goal, probes = ErrorGoal(target), 200
@@ -38,7 +38,7 @@ def test_what_is_chosen_step_by_step_meets_the_target_for_little_more_than_the_b
         error = error_of(level, texels, noise)
         if error <= target**2:
             break
-        model.add(level, error)
+        model.set(level, error)
         before, level = level, next_level(model, level, target**2, frozenset(), probes, 3 * spent)
         paid = level.samples - before.samples if level.face == before.face else level.samples
         spent += Level(level.face, paid).cost(probes)
@@ -52,7 +52,7 @@ def test_what_the_user_keeps_is_kept():
     goal = ErrorGoal(0.001, frozenset({"face"}))
     level = first_level(goal, 10, 1)
     model = ErrorModel()
-    model.add(level, 1e-3)
+    model.set(level, 1e-3)
     found = next_level(model, level, 1e-6, goal.kept, 100, 1e9)
     assert level == Level(10, 1) and found.face == 10 and found.samples > 1
     assert next_level(model, level, 1e-6, frozenset({"face", "samples"}), 100, 1e9) is None
@@ -61,7 +61,7 @@ def test_what_the_user_keeps_is_kept():
 def test_nothing_is_tried_that_does_not_help():
     model = ErrorModel()
     for level in (Level(8, 1), Level(16, 1), Level(16, 4)):
-        model.add(level, 1e-4)  # neither texels nor noise
+        model.set(level, 1e-4)  # neither texels nor noise
     assert next_level(model, Level(16, 4), 1e-6, frozenset(), 100, 1e9) is None
 
 

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 from gridlight.core import spherical_harmonics as sh
-from gridlight.core.path_check import NORMALS, PathCheck, irradiance_of
+from gridlight.core.path_check import NORMALS, SETS, PathCheck, irradiance_of
 
 PLACES = 40
 
@@ -14,16 +14,15 @@ def directions_of(count, random):
     return towards / np.linalg.norm(towards, axis=-1, keepdims=True)
 
 
-def check_of(radiance, paths, noise, seed=0):
+def check_of(radiance, paths, noise, seed=0, drawn_from=None):
     """A check of places that see ``radiance`` (directions → (…, 3)) by paths whose values are off at random."""
     random = np.random.default_rng(seed)
-    check = PathCheck(PLACES)
-    for half in (0, 1):
-        towards = directions_of(paths, random)
-        flux = 4 * np.pi * radiance(towards) * random.exponential(1.0, (PLACES, paths, 1)) ** noise
-        mean = random.exponential(1.0, 100_000) ** noise
-        check.add(half, towards, flux / mean.mean())
-    check.paths = paths
+    check = PathCheck(PLACES, drawn_from=drawn_from)
+    each = max(paths * 2 // SETS, 1)
+    towards = np.stack([directions_of(each, random) for _ in range(SETS)])
+    flux = 4 * np.pi * radiance(towards) * random.exponential(1.0, (*towards.shape[:3], 1)) ** noise
+    mean = random.exponential(1.0, 100_000) ** noise
+    check.add(towards, flux / mean.mean(), each)
     return check
 
 
@@ -54,6 +53,27 @@ def test_paths_that_are_few_say_that_they_do_not_know():
     few, many = (check_of(lobe, paths, 1).error(exact) for paths in (50, 3200))
     assert few.noise > 20 * many.noise
     assert few.bound() > many.bound()
+
+
+def test_the_noise_that_is_told_is_the_noise_there_is():
+    """The spread of the estimate over forty checks by other paths; of an exact bake, and of one that errs."""
+    exact = irradiance_of(np.broadcast_to(coefficients_of(lobe), (PLACES, 9, 3)), NORMALS)
+    for factor in (1.0, 1.1):
+        found = [check_of(lobe, 200, 1, seed).error(factor * exact) for seed in range(40)]
+        spread = np.std([error.value for error in found], ddof=1)
+        # one colour here, three of the same in the estimate, and normals that look the same way: within a factor of 3
+        assert spread / 3 < np.mean([error.noise for error in found]) < 3 * spread
+
+
+def test_of_all_places_only_the_noise_is_left_to_chance():
+    """A bake that errs in some places: how much, is known by the places that were checked, if those are all."""
+    exact = irradiance_of(np.broadcast_to(coefficients_of(lobe), (PLACES, 9, 3)), NORMALS)
+    wrong = exact * np.where(np.arange(PLACES) % 8 == 0, 1.5, 1.0)[:, None, None]
+    some, half, every = (check_of(lobe, 1000, 1, drawn_from=of).error(wrong) for of in (None, 2 * PLACES, PLACES))
+    assert some.value == half.value == every.value
+    assert every.deviation == pytest.approx(every.noise)
+    assert half.deviation**2 - half.noise**2 == pytest.approx(0.5 * (some.deviation**2 - some.noise**2))
+    assert some.deviation > 3 * every.deviation
 
 
 def test_the_floor_is_what_bands_cannot_say():
