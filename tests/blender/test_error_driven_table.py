@@ -168,7 +168,7 @@ def table_of(name, folder):
             f"{100 * verified:.2f} | {'yes' if error['met'] else 'no'} | {seconds:.1f} | {ratio} | "
             f"{error['passes'][-1]} | {'/'.join(map(str, error['bands'].values()))} | {100 * share:.0f} |"
         )
-    return rows
+    return [(*row, judge.floor) for row in rows]
 
 
 @pytest.mark.gpu
@@ -176,9 +176,15 @@ def table_of(name, folder):
 def test_verified_errors_are_below_their_targets(gpu_context, tmp_path):
     rows = [row for name in SCENES for row in table_of(name, tmp_path)]
     promised = [row for row in rows if row[2]["met"]]
-    kept = np.mean([verified <= target for target, verified, *_ in promised])
-    ratios = [seconds / cheapest for *_, seconds, cheapest, _share in rows if cheapest]
+    possible = [row for row in rows if row[-1] < row[0]]  # three bands can say it
+    kept, met = (np.mean([verified <= target for target, verified, *_ in some]) for some in (promised, possible))
+    ratios = [seconds / cheapest for *_, seconds, cheapest, _share, _floor in rows if cheapest]
+    within = np.mean([ratio <= MOST_COST for ratio in ratios])
     print(f"\n{len(promised)} of {len(rows)} promised, {100 * kept:.0f} % of them kept")
-    print(f"cost against the cheapest by hand: median {np.median(ratios):.1f}, most {max(ratios):.1f}")
-    assert kept >= LEAST_MET
-    assert np.median(ratios) <= MOST_COST
+    print(f"{len(possible)} possible by the bands, {100 * met:.0f} % of them met")
+    print(
+        f"cost against the cheapest by hand: median {np.median(ratios):.1f}, most {max(ratios):.1f}, "
+        f"{100 * within:.0f} % within {MOST_COST:g}"
+    )
+    assert kept >= LEAST_MET and met >= LEAST_MET
+    assert within >= LEAST_MET
