@@ -144,11 +144,10 @@ class ErrorDrivenBake:
             )
             if error.bound(_SURE) <= self.goal.target:
                 break
-            floor, left = self._floor(), self.goal.target**2 - self._floor()
-            if own.value <= max(wanted, own.noise) and floor > (_NEAR_FLOOR * self.goal.target) ** 2:
+            if own.value <= max(wanted, own.noise) and self._floor() > (_NEAR_FLOOR * self.goal.target) ** 2:
                 why = "what the bands cannot say"
                 break
-            if not self._decided() and error.deviation > _MOST_AIM * left > 0:
+            if not self._decided() and own.value <= _LOST * own.noise:
                 why = "what paths can tell"
                 break
             level = self._next(wanted)
@@ -363,7 +362,7 @@ class ErrorDrivenBake:
         return {
             "target": target,
             "met": bool(met),
-            "predicted": round(final.estimate, 6),
+            "predicted": round(max(final.estimate, floor.estimate), 6),
             "predicted_at_most": round(final.bound(_SURE), 6),
             "covers": "irradiance by what probes hold, where they stand; for places between them see 'between'",
             "parts": {

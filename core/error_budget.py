@@ -21,7 +21,7 @@ import numpy as np
 from .errors import InputError
 
 LEAST_TARGET, MOST_TARGET = 1e-3, 1.0
-_FIRST_FACES = (0.08, 6), (0.05, 8), (0.035, 12), (0.015, 16), (0.0, 24)  # from which target on
+_FIRST_FACES = (0.08, 6), (0.06, 8), (0.035, 12), (0.015, 16), (0.0, 24)  # from which target on
 _FACES = (6, 8, 12, 16, 24, 32, 48, 64)
 _SAMPLES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
 _GUESS_WEIGHT = 0.3  # of the guess beside what was measured
