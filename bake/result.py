@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from dataclasses import field as default
 from typing import TYPE_CHECKING, Protocol
 
+import numpy as np
+
+from ..core.conventions import MOST_REACH_M
 from ..core.errors import InputError
 from ..core.field import Field
 from ..core.grid import Grid
@@ -85,9 +88,14 @@ class BakeResult:
 
 
 def check_surfaces(snapshot: SceneSnapshot) -> None:
-    """Raises InputError for a scene without surface."""
+    """Raises InputError for a scene without surface, or with one beyond what 32 bits can square."""
     if not len(snapshot.triangles):
         raise InputError(f"scene '{snapshot.name}' has no surface that renders; add a mesh or enable one for rendering")
+    if max(-float(snapshot.vertices.min()), float(snapshot.vertices.max())) > MOST_REACH_M:
+        beyond = (abs(snapshot.vertices) > MOST_REACH_M).any(axis=1)
+        triangle = int(np.argmax(beyond[snapshot.triangles].any(axis=1)))
+        name = snapshot.object_names[int(snapshot.object_index[triangle])]
+        raise InputError(f"object '{name}' reaches farther than {MOST_REACH_M:g} m; bring it nearer or scale it down")
 
 
 def check_scene(snapshot: SceneSnapshot, result: BakeResult) -> None:

@@ -31,6 +31,9 @@ FACE_UP = np.array([[0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1], [0, -1, 0], [0, 
 
 MAX_BANDS = 4
 
+# Beyond, squares and products of lengths leave what 32 bits hold.
+MOST_REACH_M = 1e9
+
 # Probe states, as stored in the file.
 CULLED, ACTIVE, INVALID = 0, 1, 2
 

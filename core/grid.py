@@ -11,8 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .conventions import MOST_REACH_M
 from .errors import InputError
 from .settings import MAX_RESOLUTION
+
+_LEAST_EDGE_M = 1e-9
 
 
 @dataclass(frozen=True)
@@ -20,7 +23,8 @@ class Grid:
     """The nodes of one volume.
 
     Raises:
-        InputError: a resolution outside 1..256, a transform that is not finite, or a box without volume.
+        InputError: a resolution outside 1..256, a transform that is not finite, or a box without volume, or too small,
+            large or far for 32 bits.
     """
 
     matrix: np.ndarray  # (4, 4) float64, box frame −1..1 to world
@@ -39,6 +43,12 @@ class Grid:
         if not lengths.all():
             axis = "XYZ"[int(np.argmin(lengths))]
             raise InputError(f"{self.name}: zero size along {axis}; scale it along every axis, also one with one probe")
+        most = 2 * float(lengths.max())
+        if not _LEAST_EDGE_M <= most <= MOST_REACH_M or abs(self.matrix[:3, 3]).max() > MOST_REACH_M:
+            raise InputError(
+                f"{self.name}: its box is {most:.3g} m large and up to {abs(self.matrix[:3, 3]).max():.3g} m away; "
+                f"scale it to between {_LEAST_EDGE_M:g} and {MOST_REACH_M:g} m, and keep it within {MOST_REACH_M:g} m"
+            )
         if abs(np.linalg.det(axes / lengths)) < 1e-9:
             raise InputError(f"{self.name}: its box has no volume; undo its shear")
 

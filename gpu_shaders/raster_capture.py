@@ -83,7 +83,7 @@ class RasterCapture:
                 shader.uniform_sampler("instances", instance_texture)
                 shader.uniform_int("first_slot", (first_slot,))
                 shader.uniform_int("triangle_count", (self._scene.triangle_count,))
-                shader.uniform_float("near_distance", reach * 1e-6)
+                shader.uniform_float("near_distance", reach * 1e-12)
                 shader.uniform_float("far_distance", reach)
                 self._batch.draw_instanced(shader, instance_count=len(pairs))
             gpu.state.depth_mask_set(False)

@@ -20,8 +20,8 @@ void main()
   vec3 right = face_direction(face, vec2(1.0, 0.0)) - forward;
   vec3 up = face_direction(face, vec2(0.0, 1.0)) - forward;
   float depth = dot(position, forward);
-  /* Clips at near_distance; the depth that is tested comes from the fragment stage, linear and so precise at any distance. */
-  gl_Position = vec4(dot(position, right), dot(position, up), depth - 2.0 * near_distance, depth);
+  /* Clips at near_distance and nowhere far; the depth that is tested comes from the fragment stage, linear and so precise at any distance. */
+  gl_Position = vec4(dot(position, right), dot(position, up), 0.5 * depth - 1.5 * near_distance, depth);
   gl_Layer = layer;
   hit_triangle = float(index);
   hit_layer = float(layer);

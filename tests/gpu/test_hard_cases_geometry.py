@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from gridlight.core.errors import InputError
 from gridlight.core.grid import Grid
 from gridlight.core.settings import BakeSettings
 from gridlight.core.snapshot import Material, World
@@ -135,6 +136,17 @@ def test_a_hundred_thousand_tiny_objects(plain):
     result = bake(snapshot_of(corners, None, [GREY], objects, lights=[LAMP]), grid(), SMALL)
     check_whole(result)
     assert difference(light_at(result, points()), plain) < 1e-2
+
+
+@pytest.mark.parametrize("capture", ["trace", "raster"])
+def test_a_room_under_a_dome_two_thousand_kilometres_wide(plain, capture):
+    """Nothing of it is seen in a closed room. Rasterised, near surfaces were clipped by where the far ones were."""
+    check(plain, extra=[box((-1e6,) * 3, (1e6,) * 3)], settings=BakeSettings(face=8, capture=capture))
+
+
+def test_what_32_bits_cannot_hold_is_refused():
+    with pytest.raises(InputError, match="object 'object 6' reaches farther than 1e.09 m"):
+        bake_room(extra=[box((-1e12,) * 3, (1e12,) * 3)])
 
 
 def test_a_scene_without_materials(plain):

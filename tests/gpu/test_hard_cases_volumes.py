@@ -77,6 +77,12 @@ def test_boxes_without_volume_are_refused(axes):
         Grid(box_matrix(axes), (2, 2, 1))
 
 
+@pytest.mark.parametrize("size, place", [(1e10, 0.0), (1e30, 0.0), (1e-12, 0.0), (1.0, 1e12)])
+def test_boxes_that_32_bits_cannot_hold_are_refused(size, place):
+    with pytest.raises(InputError, match="scale it to between"):
+        Grid(box_matrix(size * np.eye(3), (place, 0, 0)), (2, 2, 2))
+
+
 # Where probes stand
 # --------------------------------------------------------------------------------------------------------------------
 
