@@ -138,9 +138,11 @@ class ErrorDrivenBake:
                 self._finish(None, "no light reaches the probes, there is no error to relate to it")
                 return
             error, own, wanted = self._error(), self._own_error(), self._wanted()
+            floor = np.sqrt(self._floor())
+            found = f"{100 * max(error.estimate, floor):.2g} % from paths at {len(self._checked)} probes"
             self._reporter.note(
-                f"{self._passes[-1]}: {100 * error.estimate:.2g} % from paths at {len(self._checked)} probes "
-                f"(up to {100 * error.bound(_SURE):.2g} %), the bands alone {100 * np.sqrt(self._floor()):.2g} %"
+                f"{self._passes[-1]}: {found} "
+                f"(up to {100 * error.bound(_SURE):.2g} %), the bands alone {100 * floor:.2g} %"
             )
             if error.bound(_SURE) <= self.goal.target:
                 break
@@ -350,19 +352,20 @@ class ErrorDrivenBake:
         """The part of the summary, of the file's metadata and of the report that tells of the error of ``field``."""
         target = self.goal.target
         final, floor = self._error(field), self._check.floor(field.bands)
-        texels, noise, rest = self._model.parts(self._level)
-        met = final.bound(_SURE) <= target
+        told = np.array(self._model.parts(self._level))
+        texels, noise, rest = told * min(max(self._own_error().value, 0.0) / max(told.sum(), 1e-30), 1.0)
+        met, predicted = final.bound(_SURE) <= target, max(final.estimate, floor.estimate)
         if not met:
             allowed = f"{field.bands} bands alone lose {100 * floor.estimate:.2g} %"
             self.result.warnings.append(
-                f"{self.grid.name}: --error {target:g} was not reached, the error is {100 * final.estimate:.2g} % by "
+                f"{self.grid.name}: --error {target:g} was not reached, the error is {100 * predicted:.2g} % by "
                 f"estimate (up to {100 * final.bound(_SURE):.2g} %); stopped by {why}; {allowed}"
             )
         between = self._between
         return {
             "target": target,
             "met": bool(met),
-            "predicted": round(max(final.estimate, floor.estimate), 6),
+            "predicted": round(predicted, 6),
             "predicted_at_most": round(final.bound(_SURE), 6),
             "covers": "irradiance by what probes hold, where they stand; for places between them see 'between'",
             "parts": {
