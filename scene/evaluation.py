@@ -66,8 +66,8 @@ def at_render_quality(
 def as_in_viewport(
     scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, visit: Callable[[bpy.types.Depsgraph], Result]
 ) -> Result:
-    """Call ``visit`` with the viewport's own depsgraph: nothing is evaluated twice, so it follows edits live."""
-    _leave_edit_data_current(scene)
+    """Call ``visit`` with the viewport's own depsgraph: nothing is evaluated twice, so it follows edits live. It knows
+    what is being edited; nothing is touched that would count as another edit."""
     depsgraph = view_layer.depsgraph
     if depsgraph is None:  # this view layer is not shown in any window
         with bpy.context.temp_override(scene=scene, view_layer=view_layer):

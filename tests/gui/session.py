@@ -122,6 +122,8 @@ class BlenderSession:
             if ended or time.monotonic() > deadline:
                 what = f"ended with {self._process.returncode}" if ended else f"did not answer within {timeout:.0f} s"
                 log = self._log()[-LOG_TAIL_LINES:]
+                for crash in self._folder.glob("*.crash.txt"):  # where Blender was when it crashed
+                    log += crash.read_text(errors="replace").splitlines()
                 self.stop()
                 pytest.fail(f"Blender ({self._backend}) {what}; its last words:\n" + "\n".join(log), pytrace=False)
             time.sleep(0.05)

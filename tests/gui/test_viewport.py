@@ -139,6 +139,26 @@ def test_quad_view_local_view_and_hidden_objects(person):
 
 
 @in_blender(backends=("opengl",))
+def test_a_mesh_that_is_edited_is_shown_and_pictures_come_to_rest(person):
+    """Looking at it must not count as another edit."""
+    lit_room.build(person)
+    bpy.context.view_layer.objects.active = bpy.data.objects["Cube"]
+    person.do("object.mode_set", mode="EDIT")
+    lit_room.switch(enabled=True, mode="INDIRECT")
+    yield from lit_room.drawn(person)
+    expected = lit_room.display(np.array(lit_room.ALBEDO) * lit_room.RADIANCE)
+    assert np.abs(lit_room.middle(person) - expected).max() <= 2.0, lit_room.middle(person)[0, 0]
+    person.do("mesh.select_all", action="SELECT")
+    person.do("transform.resize", value=(1, 1, 0.5))
+    yield from lit_room.drawn(person)
+    person.picture("edited")
+    height = np.ptp(person.module("viewport.sessions").existing()[0].snapshot.vertices[:, 2])
+    assert abs(height - 3.0) < 1e-4, height
+    person.do("object.mode_set", mode="OBJECT")
+    lit_room.switch(enabled=False)
+
+
+@in_blender(backends=("opengl",))
 def test_two_windows_and_loading_files(person):
     lit_room.build(person)
     lit_room.switch(enabled=True, mode="INDIRECT")
