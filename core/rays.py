@@ -13,8 +13,8 @@ import numpy as np
 
 from .bvh import NODE_TEXELS, WIDTH, Hierarchy
 
-IsHole = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""(triangles (K,), barycentric (K, 2)) -> (K,) bool: is the material clipped away there?"""
+IsHole = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""(triangles (K,), barycentric (K, 2), directions of the rays (K, 3)) -> (K,) bool: is nothing there for such a ray?"""
 
 _PAIRS_AT_ONCE = 1 << 20
 _STEP = 3.8e-6  # of a point's magnitude: 32 units in the last place of float32
@@ -85,7 +85,7 @@ def closest_hit(
         distance, barycentric = intersect(triangles[None], origins[rays, None], directions[rays, None])
         if is_hole is not None:
             ray, triangle = np.nonzero(np.isfinite(distance))
-            hole = is_hole(triangle, barycentric[ray, triangle])
+            hole = is_hole(triangle, barycentric[ray, triangle], directions[rays][ray])
             distance[ray[hole], triangle[hole]] = np.inf
         nearest = distance.argmin(axis=1)
         row = np.arange(len(nearest))

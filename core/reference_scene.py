@@ -14,7 +14,7 @@ from . import rays
 from .dithering import dither_threshold
 from .images import sample_image
 from .sheets import sheet_numbers
-from .snapshot import DIFFUSE_RAYS, DITHERED, NO_IMAGE, SHADOW_RAYS, SceneSnapshot
+from .snapshot import DIFFUSE_RAYS, DITHERED, FROM_BEHIND, NO_IMAGE, SHADOW_RAYS, SceneSnapshot
 
 
 @dataclass
@@ -52,10 +52,17 @@ class ReferenceScene:
 
     def _hole_test(self, kind: int):
         """What rays of a kind pass through; None for nothing."""
-        unseen = (self._unseen_by & kind) > 0
-        if not (unseen.any() or self._clipped.any()):
+        unseen, one_sided = (self._unseen_by & kind) > 0, (self._unseen_by & FROM_BEHIND) > 0
+        if not (unseen.any() or one_sided.any() or self._clipped.any()):
             return None
-        return lambda triangle, barycentric: unseen[triangle] | self.is_hole(triangle, barycentric)
+        edge = self.triangles[:, 1:] - self.triangles[:, :1]
+        front = np.cross(edge[:, 0], edge[:, 1])
+
+        def is_hole(triangle: np.ndarray, barycentric: np.ndarray, directions: np.ndarray) -> np.ndarray:
+            behind = one_sided[triangle] & (np.einsum("ki,ki->k", front[triangle], directions) > 0)
+            return unseen[triangle] | behind | self.is_hole(triangle, barycentric)
+
+        return is_hole
 
     def is_hole(self, triangle: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """(K,) bool: is the material of ``triangle`` (K,) clipped away at ``barycentric`` (K, 2)? Images at full

@@ -16,7 +16,7 @@ from .camera import Camera
 from .light_profiles import LightProfile
 
 NO_IMAGE = -1
-SHADOW_RAYS, DIFFUSE_RAYS = 1, 2  # kinds of rays that may not see a surface
+SHADOW_RAYS, DIFFUSE_RAYS, FROM_BEHIND = 1, 2, 4  # rays that may not see a surface: of a kind, or all from behind
 DITHERED = 2.0  # an ``alpha_threshold`` above what alpha can be: every place has one of its own, by chance
 
 
@@ -56,7 +56,7 @@ class Material:
     alpha: float = 1.0
     alpha_threshold: float = 0.0
     transmitted: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    unseen_by: int = 0  # sum of SHADOW_RAYS and DIFFUSE_RAYS: for these the surface is not there
+    unseen_by: int = 0  # sum of SHADOW_RAYS, DIFFUSE_RAYS and FROM_BEHIND: for these the surface is not there
     backface_culling: bool = False  # stated only; light transport treats every surface as two-sided, like Cycles
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ..core.snapshot import DIFFUSE_RAYS, DITHERED, NO_IMAGE, Material
+from ..core.snapshot import DIFFUSE_RAYS, DITHERED, FROM_BEHIND, NO_IMAGE, Material
 from .images import ImageTable
 from .node_links import Unsupported, active_output, find_socket
 from .notices import Notices
@@ -57,7 +57,7 @@ class MaterialTable:
             self._indices[key] = len(self.materials)
             factor = 0.0 if look.unseen_by & DIFFUSE_RAYS else look.intensity  # what no ray sees lights nothing
             emission = _three(value * factor for value in row.emission)
-            self.materials.append(replace(row, emission=emission, unseen_by=look.unseen_by))
+            self.materials.append(replace(row, emission=emission, unseen_by=row.unseen_by | look.unseen_by))
             self.domains.append(self.domains[own])
         elif key not in self._indices:
             self._indices[key] = len(self.materials)
@@ -120,7 +120,17 @@ class MaterialTable:
                 SurfaceEvaluator(owner, self._images, notices, material.name, material, samples), surface
             )
         self._notices.extend(notices)
-        return closure
+        return self._from_both_sides(closure, evaluator, surface) if evaluator.asks_side else closure
+
+    def _from_both_sides(self, front: Closure, evaluator: NodeEvaluator, surface: bpy.types.NodeSocket) -> Closure:
+        """``front`` with what is known of the back: that nothing is there."""
+        behind = NodeEvaluator(evaluator.owner, self._images, Notices(), evaluator.owner_name, evaluator.sample)
+        behind.behind = True
+        back = evaluate_shader(behind, surface)
+        if back.opacity.is_zero() and back.emission.is_zero() and front.emission.is_zero():
+            return replace(front, one_sided=True)
+        self._notices.group("surfaces show their front on both sides, whatever Backfacing asks", evaluator.owner_name)
+        return front
 
     def _append(self, name: str, closure: Closure, backface_culling: bool) -> None:
         opacity = _solid_where_opaque(closure.opacity)
@@ -154,6 +164,7 @@ class MaterialTable:
                 alpha=opacity.number() if opacity.is_constant else 1.0,
                 alpha_threshold=0.0 if opacity.is_constant and opacity.number() > 1 - _LEAST_OPACITY else DITHERED,
                 transmitted=transmitted,
+                unseen_by=FROM_BEHIND if closure.one_sided else 0,
                 backface_culling=backface_culling,
             )
         )

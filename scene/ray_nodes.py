@@ -26,7 +26,8 @@ def _light_path(evaluator, node, socket, scope):
 
 def _geometry(evaluator, node, socket, scope):
     if socket.name == "Backfacing":
-        return ZERO
+        evaluator.asks_side = True
+        return ONE if evaluator.behind else ZERO
     raise Unsupported(f"'{socket.name}' differs from point to point")
 
 

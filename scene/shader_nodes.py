@@ -36,6 +36,8 @@ class NodeEvaluator:
         self.owner_name = owner_name
         self.images = images
         self.notices = notices
+        self.behind = False  # what is asked for is what the surface shows from behind
+        self.asks_side = False  # that differs from what it shows from the front
         self.loses_pattern = False  # something that changes over the surface entered with one value
         self._values: dict[tuple, Value] = {}
 

@@ -47,6 +47,7 @@ class Closure:
     opacity: Value = ONE
     emission: Value = constant([0.0, 0.0, 0.0])
     through: Value = constant([0.0, 0.0, 0.0])
+    one_sided: bool = False  # from behind nothing is there
 
 
 BLACK = Closure()

@@ -24,7 +24,8 @@ void main()
   vec3 weights = max(vec3(1.0 - barycentric.x - barycentric.y, barycentric), vec3(0.0)); /* covered, but a little outside */
   barycentric = weights.yz / (weights.x + weights.y + weights.z);
 #ifdef HAS_UNSEEN
-  if ((int(element(triangle_corners, 3 * index + 1).w) & 4) != 0) { /* by diffuse rays, see ray_lib */
+  int flags = int(element(triangle_corners, 3 * index + 1).w); /* see ray_lib */
+  if ((flags & 4) != 0 || ((flags & 8) != 0 && slope > 0.0)) {
     discard;
   }
 #endif

@@ -12,7 +12,8 @@
 
 const float NO_HIT = 3.0e38;
 const int NO_NODE = -2147483647; /* in place of a node or leaf */
-const int CLIPPED = 1, UNSEEN_BY_SHADOW_RAYS = 2, UNSEEN_BY_DIFFUSE_RAYS = 4; /* bits of a triangle, w of its corner 1 */
+const int CLIPPED = 1, UNSEEN_BY_SHADOW_RAYS = 2, UNSEEN_BY_DIFFUSE_RAYS = 4,
+          UNSEEN_FROM_BEHIND = 8; /* bits of a triangle, w of its corner 1 */
 
 struct Ray {
   vec3 origin;
@@ -102,7 +103,10 @@ bool intersect_triangle(Ray ray, int index, int unseen, inout Hit hit)
         !starts_on(ray, corner.xyz - ray.origin, corner1.xyz - ray.origin, corner2.xyz - ray.origin)) {
       vec2 barycentric = vec2(v, w) / determinant;
 #ifdef HAS_UNSEEN
-      if ((int(corner1.w) & unseen) != 0) {
+      int flags = int(corner1.w);
+      if ((flags & unseen) != 0 ||
+          ((flags & UNSEEN_FROM_BEHIND) != 0 &&
+           dot(cross(corner1.xyz - corner.xyz, corner2.xyz - corner.xyz), ray.direction) > 0.0)) {
         return corner.w != 0.0;
       }
 #endif

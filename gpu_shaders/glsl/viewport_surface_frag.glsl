@@ -28,8 +28,25 @@ int owning_volume(vec3 point)
 void main()
 {
   int index = int(surface_triangle + 0.5);
+  vec3 eye = view_info[0].xyz, forward = view_info[3].xyz;
+  vec3 direction = forward;
+  if (view_info[0].w == 0.0) {
+    direction = normalize(surface_point - eye);
+  }
+  else {
+    eye = surface_point - forward * dot(surface_point - eye, forward);
+  }
+#ifdef HAS_UNSEEN
+  vec4 corner1 = element(triangle_corners, 3 * index + 1);
+  if ((int(corner1.w) & UNSEEN_FROM_BEHIND) != 0) {
+    vec3 a = element(triangle_corners, 3 * index).xyz;
+    if (dot(cross(corner1.xyz - a, element(triangle_corners, 3 * index + 2).xyz - a), direction) > 0.0) {
+      discard;
+    }
+  }
+#endif
 #ifdef HAS_ALPHA
-  if ((int(element(triangle_corners, 3 * index + 1).w) & 1) != 0 && is_hole(index, surface_barycentric)) {
+  if ((int(element(triangle_corners, 3 * index + 1).w) & CLIPPED) != 0 && is_hole(index, surface_barycentric)) {
     discard;
   }
 #endif
@@ -40,14 +57,6 @@ void main()
       discard;
     }
 #endif
-    vec3 eye = view_info[0].xyz, forward = view_info[3].xyz;
-    vec3 direction = forward;
-    if (view_info[0].w == 0.0) {
-      direction = normalize(surface_point - eye);
-    }
-    else {
-      eye = surface_point - forward * dot(surface_point - eye, forward);
-    }
     Surface surface = resolve_surface(index, surface_barycentric, eye, direction, view_info[3].w);
     float distance = length(surface.position - eye);
     uvec3 key = pixel_key(ivec2(gl_FragCoord.xy));

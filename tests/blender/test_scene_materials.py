@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 import pytest
-from gridlight.core.snapshot import DITHERED, NO_IMAGE
+from gridlight.core.snapshot import DITHERED, FROM_BEHIND, NO_IMAGE
 from gridlight.scene.read import read_scene
 from scene_builders import empty_scene, image, material, node, place, quad, with_nodes
 
@@ -243,6 +243,22 @@ def test_a_pattern_of_translucency_enters_with_its_mean(scene):
         made, snapshot = read(empty_scene(), built(lambda tree, shared=shared: shader(tree, shared)))
         assert made.transmitted == pytest.approx(share, abs=0.01) and made.base_image != NO_IMAGE
         assert warned(snapshot, "translucency", "'Subject'") != shared
+
+
+def test_backs_that_are_not_there(scene):
+    """Walls that are transparent from behind; any other back is named."""
+
+    def shader(tree, back):
+        facing = node(tree, "ShaderNodeNewGeometry").outputs["Backfacing"]
+        front = node(tree, "ShaderNodeBsdfDiffuse", {"Color": (0.4, 0.2, 0.6, 1)}).outputs[0]
+        other = node(tree, back).outputs[0]
+        mixed = {"Fac": facing, "Shader": front, "Shader_001": other}
+        return node(tree, "ShaderNodeMixShader", mixed).outputs[0]
+
+    for back, unseen in (("ShaderNodeBsdfTransparent", FROM_BEHIND), ("ShaderNodeBsdfDiffuse", 0)):
+        made, snapshot = read(empty_scene(), built(lambda tree, back=back: shader(tree, back)))
+        assert made.base_color == pytest.approx((0.4, 0.2, 0.6)) and made.unseen_by == unseen
+        assert made.alpha_threshold == 0 and warned(snapshot, "Backfacing", "'Subject'") == (not unseen)
 
 
 def test_glossy_keeps_its_energy_and_says_so(scene):

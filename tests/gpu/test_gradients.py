@@ -4,7 +4,6 @@
 import numpy as np
 import pytest
 from gridlight.core import gradients
-from gridlight.core.conventions import ACTIVE
 from gridlight.core.grid import Grid
 from gridlight.core.settings import BakeSettings
 from gridlight.core.snapshot import Light, Material, World
@@ -123,13 +122,13 @@ def test_gradients_are_what_the_bake_changes_by(gpu_context, room, most):
 
 
 def test_probes_without_light_of_their_own_have_no_gradient(gpu_context):
-    """One inside the box, and culled ones."""
+    """Those inside the box, and culled ones that nothing was captured for."""
     parts = [box((-2, -2, -2), (2, 2, 2))[:, ::-1], box((-0.5, -0.5, -0.5), (0.6, 0.6, 0.6))]
     lamp = Light("point", "POINT", (3.0, 2.0, 1.0), frame((1.2, 1.3, 1.4)))
     snapshot = snapshot_of(np.concatenate(parts), None, (), np.repeat([0, 1], 12), lights=[lamp])
     field = bake(snapshot, Grid.from_bounds([-1.6] * 3, [1.6] * 3, (9, 9, 9)), BakeSettings(face=6)).field
     assert (np.bincount(field.state, minlength=3) > 0).all()
-    assert not field.gradient[field.state != ACTIVE].any()
-    assert field.gradient[field.state == ACTIVE].any(axis=(1, 2, 3)).all()
+    assert (~field.holds_light).any() and not field.gradient[~field.holds_light].any()
+    assert field.gradient[field.holds_light].any(axis=(1, 2, 3)).all()
     change = np.abs(gradients.per_cell(field.grid, field.gradient[:, :, :1])).sum(axis=(1, 2))
     assert (change <= 2.0001 * field.coefficients[:, 0]).all()

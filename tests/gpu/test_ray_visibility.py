@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gridlight.core.grid import Grid
 from gridlight.core.settings import BakeSettings
-from gridlight.core.snapshot import DIFFUSE_RAYS, SHADOW_RAYS, Light, Material, World
+from gridlight.core.snapshot import DIFFUSE_RAYS, FROM_BEHIND, SHADOW_RAYS, Light, Material, World
 from small_scenes import all_lights, bake, cluttered_room, frame, snapshot_of
 from stages import Stages
 
@@ -57,7 +57,7 @@ def test_what_no_shadow_ray_sees_casts_none():
 def test_stages_agree():
     """Texels, direct light and rays of a cluttered room, some of whose clutter only one kind of ray sees."""
     snapshot = cluttered_room({name: all_lights()[name] for name in ("point", "sun wide", "rectangle")})
-    for number, unseen_by in ((4, SHADOW_RAYS), (0, DIFFUSE_RAYS)):
+    for number, unseen_by in ((4, SHADOW_RAYS), (0, DIFFUSE_RAYS), (5, FROM_BEHIND)):
         snapshot.materials[number] = replace(snapshot.materials[number], unseen_by=unseen_by)
     stages = Stages(snapshot, GRID, BakeSettings(face=8, keep_all=True, seed=5))
     expected = stages.reference.capture()
@@ -69,3 +69,18 @@ def test_stages_agree():
     hits = stages.rays(40, 200, 4)[0]
     rays = stages.reference.light.trace(stages.points, np.arange(40, 240), 4)
     assert (np.abs(hits - rays.hits)[..., :3].max(axis=-1) < 1e-4).mean() > 0.98
+
+
+@pytest.mark.parametrize("method", ["trace", "raster"])
+def test_what_is_not_there_from_behind(method):
+    """From below, a screen that faces down hides the sky and the lamp; one that faces up hides neither."""
+    facing_up, facing_down = scene(FROM_BEHIND), scene(FROM_BEHIND)
+    turned = np.concatenate([plane(0.0, 5.0), plane(2.0, 2.0, up=False)])
+    facing_down = snapshot_of(
+        turned, [0, 0, 1, 1], facing_up.materials, lights=facing_up.lights, world=World((1.0,) * 3)
+    )
+    up, down, plain = below(facing_up, method), below(facing_down, method), below(scene(0), method)
+    open_sky = below(scene(SHADOW_RAYS + DIFFUSE_RAYS), method)
+    np.testing.assert_allclose(down, plain, rtol=1e-4)
+    np.testing.assert_allclose(up, open_sky, rtol=1e-4)
+    assert (open_sky > plain + 0.1).all()

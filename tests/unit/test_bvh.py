@@ -305,7 +305,7 @@ def test_holes_let_rays_through():
     up = np.array([[0, 0, 1.0], [0, 0, 1]])
     origins = np.array([[0.5, 1.0, 0], [2, 1, 0]])
 
-    def is_hole(index, barycentric):
+    def is_hole(index, barycentric, _directions):
         return (index == 0) & (barycentric[:, 0] < 0.25)
 
     np.testing.assert_array_equal(rays.closest_hit(triangle, origins, up, is_hole).triangle, [1, 0])
