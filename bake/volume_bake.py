@@ -14,9 +14,9 @@ import numpy as np
 
 from ..core.blocks import Block
 from ..core.clearance import Obstacles
-from ..core.conventions import CULLED
+from ..core.conventions import ACTIVE, CULLED
 from ..core.grid import Grid
-from ..core.orientation import ShellVote
+from ..core.orientation import ShellVote, inside_solid
 from ..core.probe_edits import ProbeEdits
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
@@ -173,12 +173,30 @@ class VolumeBake:
         moved = int(self._placement.moved.sum())
         if moved:
             result.notes.append(f"{moved} probes in or behind walls were moved out, at most half a cell")
+        yield from self._overlook_bystanders()
         self._reporter.phase("light")
         yield from self._stopwatch.steps("light", self.backend.light.connect())
         result.notes.append(f"light bounces between {self.backend.light.count} patches of surface")
         yield
         yield from self._bounce(warm=False)
         self._mark_unshown(emission=self.backend.scene.emitter_count > 0)
+
+    def _overlook_bystanders(self) -> Steps[None]:
+        """What only probes inside solids or in the open see does not count when it is asked whether light has
+        settled: in a closed hollow of white walls it never does."""
+        placement = self._placement
+        buried = inside_solid(placement.shares, placement.light_elsewhere)
+        judges = ~buried & (self._state[placement.nodes] == ACTIVE)
+        if judges.all() or not judges.any():
+            return
+        patches = self.backend.light.patches
+        patches.forget_seen()
+        for index in range(self._batches.count):
+            surfaces = yield from self._batches.bound(index)
+            mine = self._batches.slots_of(index, np.flatnonzero(judges))
+            if len(mine):
+                patches.mark_seen(surfaces.textures["albedo"], self.settings.face, mine - surfaces.first)
+            yield
 
     @property
     def nodes(self) -> np.ndarray:
@@ -215,6 +233,7 @@ class VolumeBake:
         for index in range(self._batches.count):
             yield from self._batches.bound(index)
         yield from self._stopwatch.steps("light", self.backend.light.light_new_patches())
+        yield from self._overlook_bystanders()
         yield from self._stopwatch.steps("light", self.backend.light.connect())
         yield from self._bounce(warm=False)
         self._mark_unshown(emission=self.backend.scene.emitter_count > 0)

@@ -138,6 +138,13 @@ def patch_points_comp(info, defines):
     return _linear(info, "patch_points_comp")
 
 
+def patch_seen_comp(info, defines):
+    slot = _samplers(info, "probe_layers")
+    _samplers(info, "albedo", kind="FLOAT_2D_ARRAY", first=slot)
+    _image(info, 0, "seen", pixel="R32F")
+    return _linear(info, "patch_seen_comp")
+
+
 def patch_table_comp(info, defines):
     _samplers(info, "patch_keys")
     _atomic(info, 0, "table")

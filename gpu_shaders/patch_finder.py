@@ -20,11 +20,11 @@ from ..core.errors import InputError
 from ..core.grid import Grid
 from ..core.patches import MOST_ROUNDS, NO_PATCH, NOTHING, POINTS, VARIANTS, CellRule, coarser_by
 from .dispatch import COMPACTION_BLOCK, dispatch_linear
-from .growing_array import GrowingArray
+from .growing_array import GrowingArray, fill_elements
 from .places import Places
 from .programs import program
 from .scene_textures import SceneTextures
-from .textures import allocate_integers, read, scratch, upload
+from .textures import allocate_integers, numbers, read, scratch, upload
 
 _FREE, _NOBODY = 0, 0xFFFFFFFF
 _FEW = 1 << 14  # hits: below, room for as many patches is made unasked, and hits are not listed
@@ -64,6 +64,18 @@ class PatchFinder:
     @property
     def seen(self) -> gpu.types.GPUTexture:
         return self._seen.texture
+
+    def forget_seen(self) -> None:
+        """No probe sees any patch, until ``mark_seen`` tells which do."""
+        fill_elements(self.seen, 0, self.count, 0.0)
+
+    def mark_seen(self, albedo: gpu.types.GPUTexture, face: int, layers: np.ndarray) -> None:
+        """The patches that texels lie on of the probes in ``layers`` (L,) of texel surfaces with ``albedo``."""
+        shader, listed = program("patch_seen_comp", FACE=face), numbers(layers, "probes")
+        shader.uniform_sampler("probe_layers", listed)
+        shader.uniform_sampler("albedo", albedo)
+        shader.image("seen", self.seen)
+        gpu.compute.dispatch(shader, len(layers), 1, 1)
 
     def read_points(self) -> np.ndarray:
         """(N, POINTS, 4) float32."""

@@ -6,11 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gridlight.bake.session import BakeSession
+from gridlight.core.cubemap import unpack_normal
 from gridlight.core.grid import Grid
 from gridlight.core.settings import BakeSettings
 from gridlight.core.snapshot import Light, Material, World
+from gridlight.core.steps import run
 from small_scenes import (
     AXES,
+    Silent,
     all_lights,
     bake,
     box,
@@ -346,3 +350,21 @@ def test_light_adds_up():
     ]
     # how many samples a patch takes depends on how uneven its light is: all that is left between the two
     np.testing.assert_allclose(fields[0], fields[1] + fields[2], atol=2e-3 * np.abs(fields[0]).max())
+
+
+def test_what_only_buried_probes_see_does_not_hold_up_the_rest():
+    """A hollow of white walls keeps light for very long; probes inside it are invalid, so nobody waits for that."""
+    wall, hollow = box((-3, -3, -3), (3, 3, 3))[:, ::-1], box((-1, -1, -1), (1, 1, 1))
+    corners = np.concatenate([wall, hollow])
+    objects = np.repeat([0, 1], 12)
+    materials = [Material("grey", (0.5,) * 3), Material("white", (1.0,) * 3)]
+    lamp = Light("lamp", "POINT", (5.0,) * 3, frame((0.1, 0.2, 2.5)))
+    snapshot = snapshot_of(corners, objects, materials, objects, lights=[lamp])
+    session = BakeSession(snapshot, Grid.from_bounds([-2.5] * 3, [2.5] * 3, (9, 9, 9)), BakeSettings(face=8), Silent())
+    run(session.bake())
+    assert session.result.counts["invalid"] > 0 and session.result.converged
+    patches = session.backend.light.patches
+    leaders = patches.read_points()[:, 0].astype(float)
+    inside = (np.abs(leaders[:, :3] + 1e-3 * unpack_normal(leaders[:, 3])) < 1).all(axis=1)
+    seen = patches.read_seen()
+    assert inside.sum() > 100 and not seen[inside].any() and seen[~inside].mean() > 0.9
