@@ -95,6 +95,7 @@ class BlenderSession:
 
     def _start(self) -> None:
         self.stop()
+        self._serial = 0  # a new Blender begins to count anew
         self._folder = Path(tempfile.mkdtemp(prefix="gridlight-gui-"))
         self._pictures.mkdir(parents=True, exist_ok=True)
         environment = {
