@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Materials that let light through: holes by alpha, glass, shares of transparency, translucent sheets, absent backs."""
+
+import numpy as np
+import pytest
+from gridlight.core.snapshot import DITHERED, FROM_BEHIND, NO_IMAGE
+from scene_builders import empty_scene, image, material, node
+from shaded_square import HALF, OPAQUE, built, read, textured, warned
+
+
+@pytest.fixture
+def scene():
+    return empty_scene()
+
+
+def test_transmission_is_a_share_of_holes(scene):
+    read_material, snapshot = read(
+        scene, material("Pane", "ShaderNodeBsdfPrincipled", {"Transmission Weight": 0.2, "Alpha": 0.5})
+    )
+    assert read_material.alpha == pytest.approx(0.4) and read_material.alpha_threshold == DITHERED
+    assert warned(snapshot, "glass", "'Pane'")
+
+
+@pytest.mark.parametrize("way", ["principled", "mix", "threshold"])
+def test_leaves_are_clipped_by_their_alpha(scene, way):
+    def shader(tree):
+        shown = node(tree, "ShaderNodeTexImage", image=image("leaf", HALF), extension="CLIP")
+        alpha = shown.outputs["Alpha"]
+        if way == "principled":
+            return node(
+                tree,
+                "ShaderNodeBsdfPrincipled",
+                {"Base Color": shown.outputs["Color"], "Alpha": alpha, "Specular IOR Level": 0.0},
+            ).outputs[0]
+        if way == "threshold":
+            alpha = node(tree, "ShaderNodeMath", {"Value": alpha, "Value_001": 0.3}, operation="GREATER_THAN").outputs[
+                0
+            ]
+        leaf = node(tree, "ShaderNodeBsdfDiffuse", {"Color": shown.outputs["Color"]})
+        hole = node(tree, "ShaderNodeBsdfTransparent")
+        return node(
+            tree, "ShaderNodeMixShader", {"Fac": alpha, "Shader": hole.outputs[0], "Shader_001": leaf.outputs[0]}
+        ).outputs[0]
+
+    read_material, snapshot = read(scene, built(shader))
+    assert read_material.alpha_threshold == DITHERED
+    assert read_material.base_image == read_material.alpha_image == 0 and len(snapshot.images) == 1
+    pixels = snapshot.images[0].pixels
+    assert np.allclose(pixels[:, :4, 3], 0) and np.allclose(pixels[:, 4:], [0.2, 0.4, 0.6, 1], atol=1e-6)
+    assert snapshot.images[0].extension == "CLIP" and not snapshot.warnings
+
+
+def test_colour_is_premultiplied_where_alpha_is_not_used(scene):
+    read_material, snapshot = read(
+        scene, built(lambda tree: node(tree, "ShaderNodeBsdfDiffuse", {"Color": textured(tree)}).outputs[0])
+    )
+    pixels = snapshot.images[read_material.base_image].pixels
+    assert np.allclose(pixels[:, :4, :3], 0) and np.allclose(pixels[:, 4:, :3], [0.2, 0.4, 0.6])
+    assert read_material.alpha_image == NO_IMAGE
+
+
+def test_constant_transparency(scene):
+    read_material, snapshot = read(scene, material("Veil", "ShaderNodeBsdfPrincipled", {"Alpha": 0.7}))
+    assert read_material.alpha == pytest.approx(0.7) and read_material.alpha_threshold == DITHERED
+    scene = empty_scene()
+    _, snapshot = read(scene, material("Air", "ShaderNodeBsdfPrincipled", {"Alpha": 0.0}))
+    assert len(snapshot.triangles) == 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "inputs"),
+    [
+        ("ShaderNodeBsdfGlass", {}),
+        ("ShaderNodeBsdfRefraction", {}),
+        ("ShaderNodeBsdfPrincipled", {"Transmission Weight": 1.0}),
+    ],
+)
+def test_glass_lets_light_through(scene, kind, inputs):
+    _, snapshot = read(scene, material("Pane", kind, inputs))
+    assert len(snapshot.triangles) == 0 and warned(snapshot, "glass", "'Pane'")
+
+
+def test_fully_transparent_surfaces_go_without_a_warning(scene):
+    _, snapshot = read(scene, material("m", "ShaderNodeBsdfTransparent"))
+    assert len(snapshot.triangles) == 0 and not snapshot.warnings
+
+
+def test_translucent_lets_light_through(scene):
+    """Alone, mixed, added, and beside holes: what is sent back in all, and the share that has gone through."""
+
+    def shader(tree, way):
+        diffuse = node(tree, "ShaderNodeBsdfDiffuse", {"Color": (0.4, 0.2, 0.6, 1)}).outputs[0]
+        through = node(tree, "ShaderNodeBsdfTranslucent", {"Color": (0.4, 0.6, 0.0, 1)}).outputs[0]
+        hole = node(tree, "ShaderNodeBsdfTransparent").outputs[0]
+        if way == "alone":
+            return through
+        if way == "added":
+            return node(tree, "ShaderNodeAddShader", {"Shader": diffuse, "Shader_001": through}).outputs[0]
+        if way == "beside holes":
+            return node(tree, "ShaderNodeMixShader", {"Fac": 0.5, "Shader": hole, "Shader_001": through}).outputs[0]
+        return node(tree, "ShaderNodeMixShader", {"Fac": 0.25, "Shader": diffuse, "Shader_001": through}).outputs[0]
+
+    for way, color, share, alpha in (
+        ("alone", (0.4, 0.6, 0.0), (1, 1, 1), 1),
+        ("added", (0.8, 0.8, 0.6), (0.5, 0.75, 0), 1),
+        ("mixed", (0.4, 0.3, 0.45), (0.25, 0.5, 0), 1),
+        ("beside holes", (0.4, 0.6, 0.0), (1, 1, 1), 0.5),
+    ):
+        made, snapshot = read(empty_scene(), built(lambda tree, way=way: shader(tree, way)))
+        assert made.base_color == pytest.approx(color) and made.transmitted == pytest.approx(share), way
+        assert made.alpha == pytest.approx(alpha) and not snapshot.warnings
+
+
+def test_a_pattern_of_translucency_enters_with_its_mean(scene):
+    """One image for both parts keeps it, as they differ by a factor; another one does not, and says so."""
+
+    def shader(tree, shared):
+        color = textured(tree, pixels=OPAQUE)
+        diffuse = node(tree, "ShaderNodeBsdfDiffuse", {"Color": color}).outputs[0]
+        through = node(tree, "ShaderNodeBsdfTranslucent", {"Color": color if shared else (0.2, 0.4, 0.2, 1)}).outputs[0]
+        return node(tree, "ShaderNodeMixShader", {"Fac": 0.25, "Shader": diffuse, "Shader_001": through}).outputs[0]
+
+    for shared, share in ((True, (0.25, 0.25, 0.25)), (False, (0.25, 0.25, 0.1))):
+        made, snapshot = read(empty_scene(), built(lambda tree, shared=shared: shader(tree, shared)))
+        assert made.transmitted == pytest.approx(share, abs=0.01) and made.base_image != NO_IMAGE
+        assert warned(snapshot, "translucency", "'Subject'") != shared
+
+
+def test_backs_that_are_not_there(scene):
+    """Walls that are transparent from behind; any other back is named."""
+
+    def shader(tree, back):
+        facing = node(tree, "ShaderNodeNewGeometry").outputs["Backfacing"]
+        front = node(tree, "ShaderNodeBsdfDiffuse", {"Color": (0.4, 0.2, 0.6, 1)}).outputs[0]
+        other = node(tree, back).outputs[0]
+        mixed = {"Fac": facing, "Shader": front, "Shader_001": other}
+        return node(tree, "ShaderNodeMixShader", mixed).outputs[0]
+
+    for back, unseen in (("ShaderNodeBsdfTransparent", FROM_BEHIND), ("ShaderNodeBsdfDiffuse", 0)):
+        made, snapshot = read(empty_scene(), built(lambda tree, back=back: shader(tree, back)))
+        assert made.base_color == pytest.approx((0.4, 0.2, 0.6)) and made.unseen_by == unseen
+        assert made.alpha_threshold == 0 and warned(snapshot, "Backfacing", "'Subject'") == (not unseen)
