@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from ..core import camera as cameras
+from ..core.display import standard_view
 from ..core.errors import Cancelled
 from ..core.field import Field
 from ..core.snapshot import SceneSnapshot
@@ -17,7 +18,7 @@ from ..gpu_shaders.preview_pass import PreviewPass
 from ..gpu_shaders.scene_textures import SceneTextures
 
 WIDTH, HEIGHT = 960, 540
-_SAMPLES = 8  # per pixel
+_SAMPLES = 6  # per pixel where one shows
 _SHADOW_RAYS = 32  # per pixel: scenes with many lamps get fewer samples
 
 
@@ -40,18 +41,11 @@ def write_previews(
     camera = snapshot.camera or cameras.suggest(field, WIDTH / HEIGHT)
     renderer = PreviewPass(snapshot, scene, field, field.grid.center)
     samples = int(np.clip(_SHADOW_RAYS // max(len(snapshot.lights), 1), 2, _SAMPLES))
-    pictures = renderer.render(camera, WIDTH, HEIGHT, samples, should_stop=should_stop)
+    pictures = renderer.render(camera, WIDTH, HEIGHT, samples, exposure=snapshot.exposure, should_stop=should_stop)
     if pictures is None:
         raise Cancelled("cancelled; nothing was written")
     for path, radiance in zip((picture, probes), pictures):
         save_png(path, standard_view(radiance[..., :3], snapshot.exposure))
-
-
-def standard_view(radiance: np.ndarray, exposure: float) -> np.ndarray:
-    """Display values 0..1 of linear ``radiance``: Blender's Standard view, which is exposure in stops and the sRGB
-    curve (IEC 61966-2-1)."""
-    linear = np.clip(np.nan_to_num(radiance) * 2.0**exposure, 0.0, 1.0)
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
 def save_png(path: Path, values: np.ndarray) -> None:

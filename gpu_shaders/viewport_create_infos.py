@@ -49,10 +49,11 @@ def preview_comp(info, defines):
     _samplers(info, "world_texels", "spheres", first=slot)
     _image(info, 0, "picture", access="READ+WRITE")
     _image(info, 1, "probe_picture", access="READ+WRITE")
+    _image(info, 2, "chosen", pixel="R32F", access="READ")
     info.uniform_buf(1, "vec4", _VIEW)
-    _ints(info, "sphere_count")
+    _ints(info, "chosen_count")
     info.push_constant("FLOAT", "sphere_radius")
-    info.local_group_size(8, 8, 1)
+    info.local_group_size(64, 1, 1)
     return {"compute": [*_shading_files(defines), "preview_comp"]}
 
 

@@ -32,9 +32,9 @@ def load_package() -> None:
 load_package()
 
 from gridlight.bake.job import run_bake  # noqa: E402  (the package has just been loaded)
-from gridlight.bake.preview import standard_view  # noqa: E402
 from gridlight.bake.result import Silent  # noqa: E402
 from gridlight.core import camera, lookup, ringing  # noqa: E402
+from gridlight.core.display import standard_view  # noqa: E402
 from gridlight.core.field import Field  # noqa: E402
 from gridlight.core.grid import Grid  # noqa: E402
 from gridlight.core.settings import BakeSettings  # noqa: E402

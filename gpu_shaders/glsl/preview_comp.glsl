@@ -1,18 +1,20 @@
 /* The scene as the field lights it, without a window: camera rays and what viewport_shade_lib shows of what they hit, and probe spheres.
  *
- * Dispatch: x, y = pixels, one sample a pixel; groups of 8×8×1. Adds linear radiance to `picture` and, with the probes as spheres in
- * it, to `probe_picture`; sample_index 0 overwrites. Alpha counts samples; in views that show no light, those that hit something.
+ * Dispatch: one thread a pixel, one sample each; groups of 64: of the pixels in `chosen` (their numbers, row by row from the bottom), or where
+ * chosen_count is −1 of all, in squares of 8×8. Adds linear radiance to `picture` and, with the probes as spheres in it, to `probe_picture`;
+ * sample_index 0 overwrites. Alpha counts samples; in views that show no light, those that hit something.
  * view_info: as in viewport_surface_vert, of which the matrix is not used
- * spheres, 1 element each: centre, node of the grid, −1 culled, −2 invalid
+ * spheres: as core/sphere_tiles.py lists them by tile: centre, node of the grid, −1 culled, −2 invalid
  */
 
 #ifdef HAS_FIELD
 /* Nearest sphere along the ray: distance and its index in `sphere`, NO_HIT where none is hit. */
-float intersect_spheres(vec3 origin, vec3 direction, out int sphere)
+float intersect_spheres(int tile, vec3 origin, vec3 direction, out int sphere)
 {
   float nearest = NO_HIT;
   sphere = -1;
-  for (int i = 0; i < sphere_count; i++) {
+  vec4 range = element(spheres, tile);
+  for (int i = int(range.x); i < int(range.x + range.y); i++) {
     vec4 centre = element(spheres, i);
     float radius = sphere_radius * (centre.w < 0.0 ? 0.5 : 1.0);
     vec3 offset = centre.xyz - origin;
@@ -33,8 +35,15 @@ float intersect_spheres(vec3 origin, vec3 direction, out int sphere)
 
 void main()
 {
-  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-  ivec2 size = imageSize(picture);
+  ivec2 size = imageSize(picture), pixel;
+  if (chosen_count < 0) {
+    int square = LINEAR_THREAD / 64, inside = LINEAR_THREAD % 64, row = (size.x + 7) / 8;
+    pixel = 8 * ivec2(square % row, square / row) + ivec2(inside % 8, inside / 8);
+  }
+  else {
+    int number = LINEAR_THREAD < chosen_count ? int(imageLoad(chosen, element_position(LINEAR_THREAD)).x) : -1;
+    pixel = number < 0 ? size : ivec2(number % size.x, number / size.x);
+  }
   if (pixel.x >= size.x || pixel.y >= size.y) {
     return;
   }
@@ -59,7 +68,8 @@ void main()
 
 #ifdef HAS_FIELD
   int sphere;
-  float sphere_distance = intersect_spheres(origin, direction, sphere);
+  ivec2 tile = pixel / TILE;
+  float sphere_distance = intersect_spheres(tile.y * ((size.x + TILE - 1) / TILE) + tile.x, origin, direction, sphere);
   if (sphere_distance < hit.distance) {
     vec4 centre = element(spheres, sphere);
     seen = vec4(shade_probe(int(centre.w), normalize(origin + direction * sphere_distance - centre.xyz)), 1.0);

@@ -5,7 +5,7 @@ import bpy
 import gridlight
 import numpy as np
 import pytest
-from gridlight.bake.preview import standard_view
+from gridlight.core.display import standard_view
 from gridlight.core.field import Field
 from gridlight.core.grid import Grid
 from gridlight.gpu_shaders.preview_pass import PreviewPass

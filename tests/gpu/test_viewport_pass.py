@@ -4,11 +4,11 @@
 import gpu
 import numpy as np
 import pytest
-from gridlight.bake.preview import standard_view
 from gridlight.core import lookup
 from gridlight.core.camera import Camera, look
 from gridlight.core.conventions import ACTIVE, CULLED, DEPTH_EDGE, INVALID
 from gridlight.core.cubemap import direction_to_texel
+from gridlight.core.display import standard_view, uneven
 from gridlight.core.emitters import sampling_density
 from gridlight.core.field import Field
 from gridlight.core.grid import Grid
@@ -367,3 +367,17 @@ def test_samples_average_out_and_start_over():
     picture.samples = 0
     drawing.draw(picture, view, Shading("DIRECT"), None)
     np.testing.assert_array_equal(picture.read(), first)
+
+
+def test_more_samples_are_taken_only_where_one_shows():
+    snapshot = cluttered_room(clutter=12)
+    origin = np.zeros(3)
+    camera = look((-1.3, -1.0, 0.6), (0.5, 0.4, -0.3), ASPECT, 0.7)
+    passes = PreviewPass(snapshot, textures_of(snapshot, origin), None, origin)
+    one, _ = passes.render(camera, WIDTH, HEIGHT, 1)
+    every, _ = passes.render(camera, WIDTH, HEIGHT, 6)
+    chosen, _ = passes.render(camera, WIDTH, HEIGHT, 6, exposure=-1.0)
+    rough = uneven(standard_view(one[..., :3], -1.0), 12 / 255)
+    assert 0.05 < rough.mean() < 0.95
+    np.testing.assert_array_equal(chosen[rough], every[rough])
+    np.testing.assert_array_equal(chosen[~rough], one[~rough])

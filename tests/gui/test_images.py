@@ -89,7 +89,7 @@ def test_engine_and_command_line_draw_the_same_picture(person):
     height, width = engine.shape[:2]
     pictures = person.module("gpu_shaders.preview_pass").PreviewPass(snapshot, textures, field, origin)
     traced, _ = pictures.render(view.camera, width, height, 4)
-    traced = person.module("bake.preview").standard_view(traced[::-1, :, :3], 0.0)
+    traced = person.module("core.display").standard_view(traced[::-1, :, :3], 0.0)
     space.shading.type = "SOLID"
     scene.render.engine = "BLENDER_EEVEE"
     sessions = person.module("viewport.sessions")

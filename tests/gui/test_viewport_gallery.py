@@ -44,7 +44,7 @@ def test_gallery_on_the_screen_is_the_traced_picture(person):
         snapshot, textures, fields[0].field, session.gpu.origin
     )
     traced, _ = pictures.render(view.camera, *size, 8)
-    traced = person.module("bake.preview").standard_view(traced[..., :3], 0.0)
+    traced = person.module("core.display").standard_view(traced[..., :3], 0.0)
     height, width = (seen.shape[0] // step) * step, (seen.shape[1] // step) * step
     coarse = seen[:height, :width].reshape(height // step, step, width // step, step, 3).mean(axis=(1, 3))
     difference = np.abs(coarse - traced[: height // step, : width // step])
