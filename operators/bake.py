@@ -11,6 +11,7 @@ from bpy.props import BoolProperty
 
 from .. import viewport
 from ..core.errors import Cancelled, GridlightError
+from ..core.steps import STEP_SECONDS
 from ..scene.field_storage import remove_field, stored_text
 from . import kept_bakes, names, stale
 from .bake_task import BakeTask
@@ -18,7 +19,7 @@ from .sidebar import redraw_sidebars
 from .volume_choice import can_read_scene, chosen_volumes, has_volume, in_object_mode, volumes_of
 
 _INTERVAL_SECONDS = 0.01  # between two timer events
-BUDGET_SECONDS = 0.03  # of work in one; a single step may take longer
+BUDGET_SECONDS = STEP_SECONDS  # of work in one; the last step that begins in it may take as long again
 _REDRAW_SECONDS = 0.1
 
 _running: _Job | None = None

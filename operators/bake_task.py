@@ -19,7 +19,7 @@ from ..core.grid import Grid
 from ..core.probe_edits import ProbeEdits
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
-from ..core.steps import STEP_SECONDS, Pace, together
+from ..core.steps import STEP_SECONDS, Pace, Steps, together
 from ..formats import probe_file
 from ..formats.probe_metadata import part_hashes, provenance
 from ..gpu_shaders.context import device_description, ensure_context
@@ -30,6 +30,7 @@ from . import kept_bakes
 from .animated import animated_states, taken_back
 from .bake_progress import Progress
 from .kept_bakes import KeptBake
+from .stale import edit_count
 from .volume_choice import grid_of
 
 
@@ -103,10 +104,7 @@ class BakeTask:
         put_by_hand = animated_states(scene)
         view_layer: bpy.types.ViewLayer = scene.view_layers.get(self._view_layer)
         try:
-            # Together, because what is shown now says later whether the scene is still the one that was baked.
-            snapshot, shown_now = yield from together(
-                read_in_steps(scene, view_layer), read_in_steps(scene, view_layer, live=True)
-            )
+            snapshot, shown_now = yield from self._read(scene, view_layer)
         except RuntimeError as error:  # Blender could not evaluate the scene at render quality now
             raise InputError(f"the scene cannot be read: {error}") from error
         # Not before: reading evaluates the scene, and a volume that is animated then stands where the frame has it.
@@ -116,7 +114,7 @@ class BakeTask:
         for grid in grids:
             probe_file.check_size(grid, self.settings.bands)
         noticed = [*snapshot.warnings, *taken_back(scene, put_by_hand)]
-        shown = yield from self._pace.in_background(part_hashes, shown_now)
+        shown = (yield from self._pace.in_background(part_hashes, shown_now)) if shown_now else {}
         for warning in noticed:
             self.progress.warn(warning)
         yield
@@ -139,6 +137,23 @@ class BakeTask:
         for volume, result, about in zip(self._find_volumes(), results, metadata):
             self._store(volume, result, about, shown, quality)
         kept_bakes.keep(dict(zip(self._volumes, bakes)))
+
+    def _read(
+        self, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer
+    ) -> Steps[tuple[SceneSnapshot, SceneSnapshot | None]]:
+        """The scene as it is rendered, and as it is shown, which says later whether it is still the one that was
+        baked. None for that where somebody edited it between the steps: what was read may be of either state."""
+        reading = together(read_in_steps(scene, view_layer), read_in_steps(scene, view_layer, live=True))
+        disturbed = False
+        while True:
+            try:
+                next(reading)
+            except StopIteration as end:
+                snapshot, shown = end.value
+                return snapshot, None if disturbed else shown
+            edits = edit_count(self._scene)  # reading itself counts as some
+            yield
+            disturbed = disturbed or edit_count(self._scene) != edits
 
     def _bake(
         self, uid: int, snapshot: SceneSnapshot, grid: Grid, edits: ProbeEdits | None

@@ -8,6 +8,7 @@ have come to rest, and reading is quick, the answer is looked up, otherwise it w
 from __future__ import annotations
 
 import time
+from collections import Counter
 
 import bpy
 from bpy.app.handlers import persistent
@@ -27,6 +28,7 @@ _LIGHTS_SCENE = (bpy.types.Object, bpy.types.Mesh, bpy.types.Light, bpy.types.Ma
 
 _hashes: dict[int, dict[str, str]] = {}  # by part, of scenes as they are now, by session_uid
 _edited: set[int] = set()  # scenes that may have changed since
+_edits: Counter[int] = Counter()  # so far, by the scene's session_uid
 _read_seconds: dict[int, float] = {}
 _last_edit = 0.0  # time.monotonic()
 _reading = False  # reading may update the depsgraph, which is no edit
@@ -67,6 +69,11 @@ def compare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
     redraw_sidebars()
 
 
+def edit_count(scene_uid: int) -> int:
+    """A number that grows with every edit of a scene that may change its light; the scene by its ``session_uid``."""
+    return _edits[scene_uid]
+
+
 class GRIDLIGHT_OT_check_bake(bpy.types.Operator):
     """Compare the scene with the one that was baked"""
 
@@ -97,6 +104,7 @@ def _scene_edited(scene, depsgraph) -> None:
     global _last_edit
     if _reading or not any(isinstance(update.id, _LIGHTS_SCENE) for update in depsgraph.updates):
         return
+    _edits[scene.session_uid] += 1
     if scene.session_uid in _edited:
         _last_edit = time.monotonic()
     else:

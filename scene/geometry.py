@@ -51,7 +51,8 @@ class MeshCopy:
 
     vertices: np.ndarray  # (V, 3) float32
     corner_vertices: np.ndarray  # (C,) int32
-    corners: np.ndarray | None  # (T, 3) int32 corners of triangles; None where every face is one
+    first_corners: np.ndarray | None  # (F,) int32 of faces; None where every face is a triangle
+    corners: np.ndarray | None  # (T, 3) int32 corners of triangles; None where no face has more than four corners
     faces: np.ndarray | None  # (T,) int32, as ``corners``
     normals_domain: str  # "POINT", "CORNER" or "FACE": what ``normals`` are of
     normals: np.ndarray  # (N, 3) float32
@@ -68,12 +69,15 @@ def copy_mesh(mesh: bpy.types.Mesh, attributes: Iterable[str] = ()) -> MeshCopy:
 
     ``attributes`` names those that its materials ask for, "" the colours that renders show.
     """
-    corners = faces = None
+    first_corners = corners = faces = None
     if len(mesh.loops) != 3 * len(mesh.polygons):  # else they are triangles already
-        mesh.calc_loop_triangles()
-        count = len(mesh.loop_triangles)
-        corners = _read(mesh.loop_triangles, "loops", (count, 3), np.int32)
-        faces = _read(mesh.loop_triangle_polygons, "value", (count,), np.int32)
+        first_corners = _read(mesh.polygons, "loop_start", (len(mesh.polygons),), np.int32)
+        if np.diff(first_corners, append=np.int32(len(mesh.loops))).max() > 4:
+            # Handed over one by one, which takes four times as long as all the rest.
+            mesh.calc_loop_triangles()
+            count = len(mesh.loop_triangles)
+            corners = _read(mesh.loop_triangles, "loops", (count, 3), np.int32)
+            faces = _read(mesh.loop_triangle_polygons, "value", (count,), np.int32)
     return MeshCopy(
         vertices=(
             _read(mesh.attributes["position"].data, "vector", (len(mesh.vertices), 3), np.float32)
@@ -85,6 +89,7 @@ def copy_mesh(mesh: bpy.types.Mesh, attributes: Iterable[str] = ()) -> MeshCopy:
             if mesh.loops
             else np.empty(0, np.int32)
         ),
+        first_corners=first_corners,
         corners=corners,
         faces=faces,
         normals_domain=mesh.normals_domain,
@@ -106,8 +111,7 @@ def triangulated(copy: MeshCopy) -> MeshArrays:
     counted."""
     corners, faces = copy.corners, copy.faces
     if corners is None or faces is None:
-        count = len(copy.corner_vertices) // 3
-        corners, faces = np.arange(3 * count, dtype=np.int32).reshape(-1, 3), np.arange(count, dtype=np.int32)
+        corners, faces = _split_quads(copy)
     triangles = copy.corner_vertices[corners]
     elements = {"POINT": triangles, "CORNER": corners, "FACE": np.broadcast_to(faces[:, None], corners.shape)}
     arrays = MeshArrays(
@@ -127,6 +131,27 @@ def triangulated(copy: MeshCopy) -> MeshArrays:
     )
     _drop_unusable(arrays)
     return arrays
+
+
+def _split_quads(copy: MeshCopy) -> tuple[np.ndarray, np.ndarray]:
+    """(T, 3) int32 corners of the triangles of a mesh of triangles and quads, and (T,) int32 the face of each, as
+    Blender and Cycles split them: along the first and third corner, unless the other two lie on one side of that line,
+    as in a quad with a notch or folded over."""
+    if copy.first_corners is None:
+        count = len(copy.corner_vertices) // 3
+        return np.arange(3 * count, dtype=np.int32).reshape(-1, 3), np.arange(count, dtype=np.int32)
+    first = copy.first_corners
+    is_quad = np.diff(first, append=np.int32(len(copy.corner_vertices))) == 4
+    quads = first[is_quad]
+    a, b, c, d = (copy.vertices[copy.corner_vertices[quads + corner]] for corner in range(4))
+    with np.errstate(invalid="ignore", over="ignore"):  # corners that are not finite are dropped later
+        diagonal = c - a
+        other = np.einsum("qi,qi->q", _cross(b - a, diagonal), _cross(d - a, diagonal)) > 0
+    split = np.where(other[:, None, None], [[0, 1, 3], [1, 2, 3]], [[0, 1, 2], [0, 2, 3]])
+    faces = np.repeat(np.arange(len(first), dtype=np.int32), 1 + is_quad)
+    corners = first[faces, None] + np.arange(3, dtype=np.int32)
+    corners[is_quad[faces]] = (quads[:, None, None] + split).reshape(-1, 3)
+    return corners, faces
 
 
 def place(mesh: MeshArrays, corner_uvs: np.ndarray, matrices: np.ndarray) -> WorldTriangles:

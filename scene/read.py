@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.snapshot import DIFFUSE_RAYS, SHADOW_RAYS, Light, SceneSnapshot, World
-from ..core.steps import Steps, run
+from ..core.steps import STEP_SECONDS, Pace, Steps, run
 from .camera import read_camera
 from .evaluation import as_in_viewport, at_render_quality, rendered_objects
 from .geometry import MeshArrays, MeshCopy, WorldTriangles, copy_mesh, place, triangulated
@@ -19,7 +19,7 @@ from .instance_facts import InstanceFacts, facts_of
 from .lights import INTENSITY_PROPERTY, LightTable
 from .materials import Look, MaterialTable, apply_domain
 from .notices import Notices
-from .surface_parts import SurfaceParts
+from .surface_parts import AtlasUVs, SurfaceParts
 from .surface_values import ATLAS, Wants, wants
 from .volumes import find_volumes
 from .world import read_world
@@ -45,6 +45,8 @@ class _Instances:
     materials: list[bpy.types.Material | None]  # per slot, original datablocks
     look: Look
     facts: InstanceFacts  # of the first one
+    rows: np.ndarray = field(init=False)  # per slot, of the table of materials; as soon as they are read
+    atlases: list[AtlasUVs] = field(init=False)  # of those of its materials that have one
     matrices: list[np.ndarray] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
 
@@ -84,7 +86,7 @@ def read_scene(
     if moved:
         scene.frame_set(frame)
     try:
-        return run(_read(scene, view_layer, as_in_viewport if live else at_render_quality))
+        return run(_read(scene, view_layer, as_in_viewport if live else at_render_quality, Pace(None)))
     finally:
         if moved:
             scene.frame_set(own_frame, subframe=own_subframe)
@@ -93,8 +95,9 @@ def read_scene(
 def read_in_steps(
     scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer | None = None, *, live: bool = False
 ) -> Steps[SceneSnapshot]:
-    """``read_scene`` in steps: in the first one Blender evaluates the scene and its arrays are copied, in the others
-    follow triangles and materials, mesh by mesh.
+    """``read_scene`` in steps: in one of them Blender evaluates the scene and its arrays are copied, the first, or with
+    ``live`` the second, so that two readings side by side take turns at it. Materials follow, one by one and for both
+    in the same steps, and triangles in a thread.
 
     Raises:
         InputError: something of it was deleted between two steps.
@@ -102,7 +105,14 @@ def read_in_steps(
     """
     try:
         view_layer = view_layer or scene.view_layers[0]
-        return (yield from _read(scene, view_layer, as_in_viewport if live else at_render_quality))
+        if live:
+            yield
+        steps = _read(scene, view_layer, as_in_viewport if live else at_render_quality, Pace(STEP_SECONDS))
+        next(steps)
+        yield
+        if not live:
+            yield
+        return (yield from steps)
     except ReferenceError as error:  # how Blender tells that a datablock is gone
         raise InputError("something was deleted while the scene was read; bake again") from error
 
@@ -112,7 +122,11 @@ def read_evaluated(depsgraph: bpy.types.Depsgraph, world: World) -> SceneSnapsho
 
     ``world`` is the background, which may take a render to find out.
     """
-    return run(_read(depsgraph.scene, depsgraph.view_layer, lambda _scene, _layer, visit: visit(depsgraph), world))
+
+    def evaluate(_scene, _view_layer, visit):
+        return visit(depsgraph)
+
+    return run(_read(depsgraph.scene, depsgraph.view_layer, evaluate, Pace(None), world))
 
 
 def read_lights(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[Light]:
@@ -130,7 +144,7 @@ def read_lights(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list
     return lights.lights
 
 
-def _read(scene, view_layer, evaluate, world: World | None = None) -> Steps[SceneSnapshot]:
+def _read(scene, view_layer, evaluate, pace: Pace, world: World | None = None) -> Steps[SceneSnapshot]:
     notices = Notices()
     harvest = evaluate(
         scene,
@@ -145,10 +159,7 @@ def _read(scene, view_layer, evaluate, world: World | None = None) -> Steps[Scen
         "name": scene.name,
     }
     yield
-    meshes = {}
-    for key, (copy, name) in harvest.meshes.items():
-        meshes[key] = _triangulated(copy, name, notices)
-        yield
+    meshes = yield from pace.in_background(_all_triangulated, harvest.meshes, notices)
     images = ImageTable(notices)
     surfaces = SurfaceParts()
     # Inside a render engine's callback Cycles cannot be asked, and so no atlas be filled.
@@ -158,14 +169,14 @@ def _read(scene, view_layer, evaluate, world: World | None = None) -> Steps[Scen
         group.mesh = meshes[group.mesh_key]
         group.materials = [override] if override else group.materials or [None]
         surfaces.add(group, group.materials)
-    parts = []
-    object_names: list[str] = []
     for group in harvest.groups.values():
-        part = _assemble(group, surfaces, materials, len(object_names), notices)
-        object_names += group.names
-        if part is not None:
-            parts.append(part)
-        yield
+        group.rows = np.empty(len(group.materials), np.int32)
+        for slot, material in enumerate(group.materials):
+            group.rows[slot] = materials.index(material, group.look)
+            yield
+        placed = {material for row, material in zip(group.rows, group.materials) if materials.domains[row] == ATLAS}
+        group.atlases = [atlas for material in placed if (atlas := surfaces.corner_uvs(material, group)) is not None]
+    surface = yield from pace.in_background(_assembled, list(harvest.groups.values()), materials, notices)
     lights = LightTable(images, notices, measures=world is None)
     for item, matrix, name in harvest.lights:
         lights.add(item, matrix, name)
@@ -173,9 +184,9 @@ def _read(scene, view_layer, evaluate, world: World | None = None) -> Steps[Scen
     background = world or read_world(scene, notices)
     yield
     return SceneSnapshot(
-        **_joined(parts),
+        **surface,
         **about,
-        object_names=object_names,
+        object_names=[name for group in harvest.groups.values() for name in group.names],
         materials=materials.materials,
         images=images.images,
         lights=lights.lights,
@@ -279,6 +290,10 @@ def _slot_materials(item: bpy.types.Object, mesh: bpy.types.Mesh) -> list[bpy.ty
     return [material.original if material else None for material in materials]
 
 
+def _all_triangulated(meshes: dict[tuple, tuple[MeshCopy, str]], notices: Notices) -> dict[tuple, MeshArrays]:
+    return {key: _triangulated(copy, name, notices) for key, (copy, name) in meshes.items()}
+
+
 def _triangulated(copy: MeshCopy, name: str, notices: Notices) -> MeshArrays:
     arrays = triangulated(copy)
     if arrays.not_finite:
@@ -291,18 +306,25 @@ def _triangulated(copy: MeshCopy, name: str, notices: Notices) -> MeshArrays:
     return arrays
 
 
-def _assemble(
-    group: _Instances, surfaces: SurfaceParts, materials: MaterialTable, first_object: int, notices: Notices
-) -> dict | None:
+def _assembled(groups: list[_Instances], materials: MaterialTable, notices: Notices) -> dict[str, np.ndarray]:
+    """All triangles of the scene with their per-triangle arrays. Asks Blender nothing: all materials are read."""
+    parts = []
+    objects = 0
+    for group in groups:
+        part = _assemble(group, materials, objects, notices)
+        objects += len(group.names)
+        if part is not None:
+            parts.append(part)
+    return _joined(parts)
+
+
+def _assemble(group: _Instances, materials: MaterialTable, first_object: int, notices: Notices) -> dict | None:
     """World triangles of ``group`` with their per-triangle arrays; None where nothing is left."""
     mesh = group.mesh
-    rows = np.array([materials.index(material, group.look) for material in group.materials], np.int32)
-    used = rows[np.clip(mesh.slots, 0, len(rows) - 1)]
+    used = group.rows[np.clip(mesh.slots, 0, len(group.rows) - 1)]
     uvs = _corner_uvs(mesh, used, materials, group.names[0], notices)
-    for row, material in zip(rows, group.materials):
-        if materials.domains[row] == ATLAS and (used == row).any():
-            chosen, own = surfaces.corner_uvs(material, group)
-            uvs[chosen] = own
+    for chosen, own in group.atlases:
+        uvs[chosen] = own
     visible = ~np.isin(used, [row for row in np.unique(used) if materials.is_hole(row)])
     if not visible.any():
         return None

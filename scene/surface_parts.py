@@ -9,6 +9,9 @@ import numpy as np
 from .surface_atlas import fits
 from .surface_samples import Part, SurfaceSamples
 
+# (T,) bool of the triangles of a group that show a material, and their (T', 3, 2) atlas coordinates.
+AtlasUVs = tuple[np.ndarray, np.ndarray]
+
 
 class SurfaceParts:
     """Groups of instances, each with its materials per slot; atlases are made when they are asked for."""
@@ -37,8 +40,8 @@ class SurfaceParts:
             self._samples[key] = SurfaceSamples(parts) if whole else None
         return self._samples[key]
 
-    def corner_uvs(self, material: bpy.types.Material, group) -> tuple[np.ndarray, np.ndarray]:
-        """(T,) bool of the triangles of ``group`` that show ``material`` and their (T', 3, 2) atlas coordinates."""
+    def corner_uvs(self, material: bpy.types.Material, group) -> AtlasUVs | None:
+        """Where ``group`` shows ``material`` in its atlas; None where it does not show it at all."""
         samples = self.samples(material)
-        part = self._part[material.as_pointer(), id(group)]
-        return samples.parts[part].chosen, samples.corner_uvs(part)
+        part = self._part.get((material.as_pointer(), id(group)))
+        return None if part is None else (samples.parts[part].chosen, samples.corner_uvs(part))
