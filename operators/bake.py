@@ -15,6 +15,7 @@ from ..core.steps import STEP_SECONDS
 from ..scene.field_storage import remove_field, stored_text
 from . import kept_bakes, names, stale
 from .bake_task import BakeTask
+from .libraries import cannot_keep
 from .sidebar import redraw_sidebars
 from .volume_choice import can_read_scene, chosen_volumes, has_volume, in_object_mode, volumes_of
 
@@ -179,7 +180,12 @@ class GRIDLIGHT_OT_relight(_BakesVolumes, bpy.types.Operator):
     def poll(cls, context):
         if not super().poll(context):
             return False
-        if not any(kept_bakes.is_kept(volume.session_uid) for volume in chosen_volumes(context)):
+        try:
+            chosen = chosen_volumes(context)
+        except GridlightError as error:
+            cls.poll_message_set(str(error))
+            return False
+        if not any(kept_bakes.is_kept(volume.session_uid) for volume in chosen):
             cls.poll_message_set("A relight goes on from a bake that is still on the GPU; bake first")
             return False
         return True
@@ -214,13 +220,22 @@ class GRIDLIGHT_OT_clear_bake(bpy.types.Operator):
     def poll(cls, context):
         if not in_object_mode(cls, context):
             return False
-        if not any(stored_text(volume) for volume in volumes_of(context.scene)):
+        baked = [volume for volume in volumes_of(context.scene) if stored_text(volume)]
+        if not baked:
             cls.poll_message_set("Nothing is baked")
-            return False
-        return True
+        elif all(reasons := [cannot_keep(volume) for volume in baked]):
+            cls.poll_message_set(reasons[0])
+        else:
+            return True
+        return False
 
     def execute(self, context):
-        for volume in chosen_volumes(context):
+        try:
+            chosen = chosen_volumes(context)
+        except GridlightError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for volume in chosen:
             remove_field(volume)
             viewport.field_changed(volume)
         return {"FINISHED"}

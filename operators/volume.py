@@ -14,6 +14,7 @@ from ..core.snapshot import SceneSnapshot
 from ..scene.read import read_scene
 from ..scene.volumes import box_of, create_volume, fit_volume, is_volume, resolution_for, resolution_of
 from . import names
+from .libraries import library_of
 from .volume_choice import active_volume, can_read_scene, in_object_mode, volumes_of
 
 _FIT_ITEMS = [
@@ -32,7 +33,7 @@ class GRIDLIGHT_OT_add_volume(bpy.types.Operator):
     fit: EnumProperty(name="Fit to", description="What the volume goes around", items=_FIT_ITEMS)
     by_spacing: BoolProperty(
         name="Choose Spacing",
-        description="Give the distance between probes; otherwise there will be about a thousand of them",
+        description="Give the distance between probes; otherwise there will be one to three thousand of them",
     )
     spacing: FloatProperty(
         name="Spacing", description="Distance between probes", default=1.0, min=1e-3, soft_max=10.0, unit="LENGTH"
@@ -81,10 +82,14 @@ class GRIDLIGHT_OT_fit_volume(bpy.types.Operator):
     def poll(cls, context):
         if not can_read_scene(cls, context):
             return False
-        if active_volume(context) is None:
+        volume = active_volume(context)
+        if volume is None:
             cls.poll_message_set("Select a probe volume first")
-            return False
-        return True
+        elif library_of(volume):
+            cls.poll_message_set(f"'{volume.name}' comes from {library_of(volume)}; change it in that file")
+        else:
+            return True
+        return False
 
     def execute(self, context):
         volume = active_volume(context)

@@ -8,6 +8,7 @@ import bpy
 from ..core.errors import InputError
 from ..core.grid import Grid
 from ..scene.volumes import box_of, is_volume, resolution_of
+from .libraries import cannot_keep
 
 
 def volumes_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -26,16 +27,21 @@ def active_volume(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def chosen_volumes(context: bpy.types.Context, everything: bool = False) -> list[bpy.types.Object]:
-    """The active volume, or all where none is active or ``everything`` is asked for.
+    """The active volume, or all where none is active or ``everything`` is asked for; only those whose light this file
+    can keep.
 
     Raises:
-        InputError: the scene has none.
+        InputError: the scene has none, or there is none among these that this file can keep light for.
     """
     volumes = volumes_of(context.scene)
     if not volumes:
         raise InputError("the scene has no probe volume; add one with Add › Light Probe › Gridlight Volume")
     active = None if everything else active_volume(context)
-    return volumes if active is None else [active]
+    chosen = volumes if active is None else [active]
+    own = [volume for volume in chosen if not cannot_keep(volume)]
+    if not own:
+        raise InputError(cannot_keep(chosen[0]))
+    return own
 
 
 def grid_of(volume: bpy.types.Object) -> Grid:
@@ -65,8 +71,10 @@ def in_object_mode(operator, context: bpy.types.Context) -> bool:
 
 
 def has_volume(operator, context: bpy.types.Context) -> bool:
-    """For ``poll``: the scene has a volume, or a line that says so."""
-    if volumes_of(context.scene):
-        return True
-    operator.poll_message_set("Add a probe volume first: Add › Light Probe › Gridlight Volume")
-    return False
+    """For ``poll``: the scene has a volume whose light this file can keep, or a line that says so."""
+    reasons = [cannot_keep(volume) for volume in volumes_of(context.scene)]
+    if not reasons:
+        operator.poll_message_set("Add a probe volume first: Add › Light Probe › Gridlight Volume")
+    elif all(reasons):
+        operator.poll_message_set(reasons[0])
+    return not all(reasons)

@@ -38,7 +38,7 @@ class GRIDLIGHT_PT_bake(SidebarPanel, bpy.types.Panel):
         elif settings.use_error:
             row.label(text="Settings are chosen for this error")
         elif quality:
-            row.label(text=f"Measured: {quality.error_percent:.1f} % off path tracing")
+            row.label(text=f"In the gallery: {quality.error_percent:.1f} % off path tracing")
         else:
             row.label(text="Error of these settings: not measured")
         row = layout.row(align=True)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..operators import names
+from ..operators.libraries import library_of
 from ..scene.lights import GROUP_PROPERTY, is_dynamic
 from .sidebar_panel import SidebarPanel, paragraph
 
@@ -59,6 +60,8 @@ class GRIDLIGHT_PT_lights(SidebarPanel, bpy.types.Panel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         light = item.gridlight_light
+        if library_of(item):
+            paragraph(layout, context, f"From {library_of(item)}: to be changed there", "LIBRARY_DATA_DIRECT")
         column = layout.column()
         column.prop(light, "role")
         column.prop(light, "group")

@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 
 from ..operators import names
+from ..operators.libraries import library_of
 from ..operators.volume_choice import active_volume, volumes_of
 from ..scene import probe_objects
 from ..scene.field_storage import has_moved, stored_counts
@@ -37,8 +38,12 @@ class GRIDLIGHT_PT_volume(SidebarPanel, bpy.types.Panel):
         row.operator(names.ADD_VOLUME, text="", icon="ADD")
         if active is None:
             paragraph(layout, context, "Select a volume to see and change it", "INFO")
-        else:
-            _grid(layout, active)
+            return
+        if library_of(active):
+            paragraph(
+                layout, context, f"From {library_of(active)}: to be changed and baked there", "LIBRARY_DATA_DIRECT"
+            )
+        _grid(layout, active)
 
 
 class GRIDLIGHT_PT_probes(SidebarPanel, bpy.types.Panel):

@@ -35,9 +35,8 @@ def fit_volume(snapshot: SceneSnapshot, spacing: float | None = None, resolution
     """An axis-aligned grid around what matters in ``snapshot``.
 
     Args:
-        spacing: metres between probes; by default a round figure that gives about a thousand probes, which for a room
-        is
-            half a metre to a metre.
+        spacing: metres between probes; by default a round figure that gives about a thousand probes within the bounds,
+            which for a room is half a metre to a metre. With the layer outside there are up to three times as many.
         resolution: probes per axis instead of a spacing.
 
     Raises:

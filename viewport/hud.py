@@ -14,6 +14,7 @@ from .sessions import SceneSession
 _SIZE, _LEADING, _MARGIN = 12, 1.5, 16
 _TEXT = (1.0, 1.0, 1.0, 0.95)
 _SHADOW = (0.0, 0.0, 0.0, 0.8)
+_OUTLINE = 6  # the kind of shadow
 # As viewport_data_lib.glsl colours them.
 HEAT = [(0.08, 0.1, 0.45), (0.1, 0.6, 0.85), (0.2, 0.75, 0.25), (0.95, 0.85, 0.15), (0.85, 0.1, 0.08)]
 HEAT_END_PERCENT = 20
@@ -77,7 +78,7 @@ def write(text: str, x: float, y: float, scale: float, color=_TEXT, size: int = 
     font = 0
     blf.size(font, size * scale)
     blf.enable(font, blf.SHADOW)
-    blf.shadow(font, 3, *_SHADOW)
+    blf.shadow(font, _OUTLINE, *_SHADOW)  # white ground is common: a soft shadow would not do
     blf.color(font, *color)
     blf.position(font, x, y, 0)
     blf.draw(font, text)

@@ -69,6 +69,21 @@ def test_data_modes_and_probes(person):
 
 
 @in_blender(backends=("opengl",))
+def test_words_can_be_read_before_white(person):
+    """The readout says that the scene renders with another view transform; its letters are white, outlined in black."""
+    lit_room.build(person, radiance=100.0)
+    lit_room.switch(enabled=True, mode="INDIRECT")
+    yield from lit_room.drawn(person)
+    person.picture("white")
+    view = person.rectangle()
+    corner = person.look(type(view)(view.x, view.y + view.height - 40, view.width // 2, 40))
+    assert (corner > 250).all(axis=2).mean() > 0.8, "white all around"
+    dark = (corner < 170).all(axis=2).mean()
+    assert 0.02 < dark < 0.2, dark
+    lit_room.switch(enabled=False)
+
+
+@in_blender(backends=("opengl",))
 def test_a_click_on_a_sphere_selects_its_probe(person):
     volume = lit_room.build(person)
     probe_objects = person.module("scene.probe_objects")
