@@ -60,6 +60,17 @@ class Batches:
             self._bound.add(index)
         return surfaces
 
+    def reflect_again(self) -> Steps[None]:
+        """What glossy texels mirror anew, in steps, for other lamps or another world. What is not kept sees it when it
+        is captured again."""
+        for index in sorted(self._bound):
+            surfaces = self._kept[index]
+
+            def reflect(first: int, number: int, surfaces=surfaces) -> None:
+                self._backend.reflect(surfaces, first, number)
+
+            yield from self.stopwatch.steps("light", self.pace.portions("reflect", surfaces.count, reflect, 1, 64))
+
     def capture_again(self, slots: np.ndarray) -> Steps[None]:
         """Captures probes ``slots`` (L,), ascending, anew, in steps: they moved or see something else."""
         for index in range(self.count):

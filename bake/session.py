@@ -54,7 +54,7 @@ class BakeSession(VolumeBake):
         self._lamps_before = len(self.snapshot.lights)
         self.snapshot = snapshot
         captures = self._batches.captures
-        had_emitters = self.backend.scene.emitter_count > 0
+        had_emitters, had_gloss = self.backend.scene.emitter_count > 0, self.backend.scene.has_gloss
         order = self.backend.scene.hierarchy.order
         with self._stopwatch("setup"):
             self._reporter.phase("upload")
@@ -66,6 +66,7 @@ class BakeSession(VolumeBake):
         rebind = bool(changes.shape)
         if changes.world or changes.emission or changes.reflectance:
             rebind |= yield from self._resolve()
+        rebind |= changes.reflectance and (had_gloss or self.backend.scene.has_gloss)  # rays are mirrored elsewhere
         if not rebind:
             rebind = not (yield from self._light_again(changes, had_emitters, live))
         if rebind:
@@ -88,11 +89,14 @@ class BakeSession(VolumeBake):
             relit.lights_direct = yield from self._stopwatch.steps("light", light.light_again(lamps, emitters))
             relit.patches_lit = light.count if relit.lights_direct or emitters else 0
             yield
-        if changes.world or changes.emission or changes.reflectance:
+        mirrors_change = self.backend.scene.has_gloss and (changes.any_light or changes.emission or changes.world)
+        if changes.world or changes.emission or changes.reflectance or mirrors_change:
             if not (yield from self._stopwatch.steps("light", light.carry_again())):
                 return False
             relit.patches_traced = light.count
             yield
+        if mirrors_change:
+            yield from self._batches.reflect_again()
         if not live:
             yield from judge_again(self._placement, self._batches, self.backend)
             if self._placement.is_outdated:

@@ -195,7 +195,8 @@ class VolumeBake:
             surfaces = yield from self._batches.bound(index)
             mine = self._batches.slots_of(index, np.flatnonzero(judges))
             if len(mine):
-                patches.mark_seen(surfaces.textures["albedo"], self.settings.face, mine - surfaces.first)
+                layers = mine - surfaces.first
+                patches.mark_seen(surfaces.textures, self.settings.face, layers, self.backend.gloss.defines)
             yield
 
     @property

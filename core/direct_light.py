@@ -95,12 +95,7 @@ def _sample_area(light: Light, points: np.ndarray, u: np.ndarray) -> LightSample
     directions = to_light / np.maximum(distances, 1e-20)[:, None]
     cosine = directions @ back
     area = light.size_x * light.size_y * (np.pi / 4 if is_ellipse else 1.0)
-    spread = np.ones(len(points))
-    if light.spread < _FULL_SPREAD:
-        half = max(light.spread / 2, _LEAST_HALF_SPREAD)
-        tangent = np.sqrt(np.maximum(1 - cosine * cosine, 0)) / np.maximum(cosine, 1e-6)
-        spread = np.maximum(np.tan(half) - tangent, 0) / (np.tan(half) - half)
-    factor = spread * np.maximum(cosine, 0) * area / np.maximum(distances * distances, 1e-20)
+    factor = spread_share(light, cosine) * np.maximum(cosine, 0) * area / np.maximum(distances * distances, 1e-20)
     return LightSamples(directions, distances, factor[:, None] * np.asarray(light.color))
 
 
@@ -139,6 +134,77 @@ def _sample_point(light: Light, points: np.ndarray, u: np.ndarray) -> LightSampl
         np.where(inside, disk_distance, centre_distance * cosine - depth),
         factor[:, None] * colour,
     )
+
+
+def extent(light: Light, points: np.ndarray) -> np.ndarray:
+    """(N,) steradians, roughly, under which ``points`` (N, 3) see ``light``: by its size and the distance of its
+    middle."""
+    if light.kind == "SUN":
+        return np.full(len(points), 2 * np.pi * (1.0 - np.cos(light.angle / 2)))
+    area = np.pi * light.radius**2
+    if light.kind == "AREA":
+        area = light.size_x * light.size_y * (np.pi / 4 if light.shape == "ELLIPSE" else 1.0)
+    to_centre = np.asarray(light.matrix, float)[:3, 3] - points
+    return area / np.maximum(np.einsum("ni,ni->n", to_centre, to_centre), 1e-20)
+
+
+def met(light: Light, points: np.ndarray, directions: np.ndarray, limits: np.ndarray) -> np.ndarray:
+    """(N, 3) radiance of ``light`` that rays from ``points`` along ``directions`` (N, 3 each) meet nearer than
+    ``limits`` (N,); the shapes are those that ``sample_light`` samples."""
+    matrix = np.asarray(light.matrix, float)
+    colour = np.asarray(light.color, float)
+    if light.kind == "SUN":
+        one_minus_cos = 1.0 - np.cos(light.angle / 2)
+        if one_minus_cos == 0:
+            return np.zeros((len(points), 3))
+        hit = np.isinf(limits) & (1.0 - directions @ matrix[:3, 2] < one_minus_cos)
+        return np.where(hit[:, None], colour / (np.pi * one_minus_cos * (2.0 - one_minus_cos)), 0.0)
+    to_centre = matrix[:3, 3] - points
+    if light.kind == "AREA":
+        hit, distance, factor = _met_area(light, to_centre, directions)
+    elif light.radius > 0:
+        hit, distance = _met_ball(light, to_centre, directions)
+        factor = np.full(len(points), 1.0 / (np.pi * light.radius**2))
+    else:
+        return np.zeros((len(points), 3))
+    factor = np.where(hit & (distance < limits), factor, 0.0)
+    if light.kind == "SPOT":
+        factor *= spot_mask(light, directions)
+    factor = factor[:, None] * colour
+    if light.profile is not None:
+        factor *= light.profile.factor(-directions @ matrix[:3, :3], np.where(hit, distance, 1.0))
+    return factor
+
+
+def _met_area(light: Light, to_centre: np.ndarray, directions: np.ndarray):
+    matrix = np.asarray(light.matrix, float)
+    cosine = directions @ matrix[:3, 2]
+    distance = (to_centre @ matrix[:3, 2]) / np.where(cosine > 1e-6, cosine, 1.0)
+    place = directions * distance[:, None] - to_centre
+    x, y = place @ matrix[:3, 0] / max(light.size_x, 1e-20), place @ matrix[:3, 1] / max(light.size_y, 1e-20)
+    inside = x * x + y * y < 0.25 if light.shape == "ELLIPSE" else np.maximum(np.abs(x), np.abs(y)) < 0.5
+    return (cosine > 1e-6) & (distance > 0) & inside, distance, spread_share(light, cosine)
+
+
+def _met_ball(light: Light, to_centre: np.ndarray, directions: np.ndarray):
+    squared = np.einsum("ni,ni->n", to_centre, to_centre)
+    along = np.einsum("ni,ni->n", to_centre, directions)
+    as_disk = light.soft_falloff | (squared <= light.radius**2)
+    reach = squared / np.where(along > 0, along, 1.0)  # along the ray to the disk that faces the point
+    beside = reach * reach - squared
+    aside = squared - along * along
+    near = along - np.sqrt(np.maximum(light.radius**2 - aside, 0.0))
+    hit = np.where(as_disk, beside < light.radius**2, aside < light.radius**2) & (along > 0)
+    return hit, np.where(as_disk, reach, near)
+
+
+def spread_share(light: Light, cosine: np.ndarray) -> np.ndarray:
+    """(N,) share of an area light's radiance that its grid lets through at ``cosine`` (N,) to its axis."""
+    if light.spread >= _FULL_SPREAD:
+        return np.ones(len(cosine))
+    half = max(light.spread / 2, _LEAST_HALF_SPREAD)
+    tangent = np.sqrt(np.maximum(1 - cosine * cosine, 0)) / np.maximum(cosine, 1e-6)
+    return np.maximum(np.tan(half) - tangent, 0) / (np.tan(half) - half)
 
 
 def spot_mask(light: Light, directions: np.ndarray) -> np.ndarray:

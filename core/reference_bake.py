@@ -27,11 +27,14 @@ from .cubemap import (
 )
 from .direct_light import sample_light
 from .field import Field
+from .gloss import TEXEL_RAYS
 from .grid import Grid
 from .open_air import open_nodes
 from .orientation import ShellVote, inside_solid
-from .patches import gather_rays
-from .reference_light import ReferenceLight, off_surface
+from .patches import NO_PATCH, gather_rays
+from .reference_gloss import TexelReflections, texel_reflections
+from .reference_light import ReferenceLight
+from .reference_places import off_surface
 from .reference_scene import ReferenceScene, Surfaces
 from .sampling import keys_of, sample_r2
 from .settings import BakeSettings
@@ -98,6 +101,21 @@ class ReferenceBake:
     def texel_sheets(self, surfaces: Surfaces) -> np.ndarray:
         """(P, X) sheets that the texels see, 0 for none."""
         return np.where(surfaces.triangle >= 0, self.scene.sheet[surfaces.triangle], 0)
+
+    def reflections(self, surfaces: Surfaces) -> TexelReflections:
+        """What glossy texels mirror and send back diffusely; ``surfaces`` as captured."""
+        where = self.points(surfaces), self.directions, self.nodes, self.settings.face, self.settings.seed
+        return texel_reflections(self.light.gloss, surfaces, *where)
+
+    def mirrored(self, reflections: TexelReflections, ends: np.ndarray, irradiance: np.ndarray) -> np.ndarray:
+        """(P, X, 3) radiance that texels mirror by the ``irradiance`` (N, 3) of the patches ``ends`` (P·X·K,) on which
+        their rays end."""
+        if not len(irradiance):
+            return reflections.carried
+        each = (*reflections.carried.shape[:2], TEXEL_RAYS)
+        coming = np.where((ends >= 0)[:, None], reflections.sent * irradiance[np.maximum(ends, 0)] / np.pi, 0.0)
+        counted = np.maximum((ends != NO_PATCH).reshape(each).sum(axis=2), 1)
+        return reflections.carried + coming.reshape(*each, 3).sum(axis=2) / counted[..., None]
 
     def bind(self, surfaces: Surfaces) -> np.ndarray:
         """(P, X) patches that the texels lie on, founded where there are none; −1 where nothing is to be lit."""
@@ -235,17 +253,22 @@ def bake(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, offset: np
     assert settings.bounces is not None
     job = ReferenceBake(snapshot, grid, settings, offset)
     surfaces = job.capture()
+    reflections = job.reflections(surfaces)
+    surfaces.albedo = reflections.diffuse
+    ends = job.light.bind_reflections(reflections)
     patch = job.bind(surfaces)
     job.light.light_new_patches()
-    field = job.field_statistics(surfaces, job.reflected(surfaces, patch, job.light.direct))
+    mirrored = job.mirrored(reflections, ends, job.light.direct)
+    field = job.field_statistics(surfaces, job.reflected(surfaces, patch, job.light.direct) + mirrored)
     job.light.connect()
     irradiance = job.light.iterate(settings.bounces)
+    mirrored = job.mirrored(reflections, ends, irradiance)
     if settings.gather:
         hits = job.texel_hits(surfaces).reshape(-1, 4)
         sheets = job.texel_sheets(surfaces).ravel()
         irradiance = job.light.gather(hits, gather_rays(settings.samples), irradiance, 0, sheets)
         patch = np.where(patch >= 0, np.arange(patch.size).reshape(patch.shape), patch)
-    reflected = job.reflected(surfaces, patch, irradiance)
+    reflected = job.reflected(surfaces, patch, irradiance) + mirrored
     coefficients = job.project(surfaces, reflected) + job.project_emitters(surfaces) + job.project_suns()
     field.coefficients = np.zeros((grid.count, settings.bands**2, 3))
     field.coefficients[job.nodes] = coefficients

@@ -17,8 +17,9 @@ import numpy as np
 
 from . import direct_light
 from .conventions import LUMINANCE
-from .cubemap import direction_to_texel, octahedral_encode, pack_normal, unpack_normal
+from .cubemap import direction_to_texel
 from .emitters import CANDIDATES, sampling_density
+from .gloss import MOST_REFLECTIONS, PATCH_BLUR
 from .grid import Grid
 from .patches import (
     ALL,
@@ -33,8 +34,10 @@ from .patches import (
     effort,
     light_parts,
 )
-from .rays import leave_surface, pull_back, step_off
+from .rays import leave_surface, step_off
 from .reference_emitters import ReferenceEmitters
+from .reference_gloss import ReferenceGloss, TexelReflections, Ways
+from .reference_places import off_surface, pack, split
 from .reference_scene import ReferenceScene
 from .sampling import keys_of, light_keys, pcg3d, sample_cosine, sample_r2, shifted
 from .settings import BakeSettings
@@ -77,6 +80,12 @@ class ReferenceLight:
         rest, self._suns = extract_suns(scene.snapshot.world)
         self._world = world_texels(rest, settings.face).reshape(-1, 3)
         self._effort = 1
+        self.gloss = ReferenceGloss(scene, self.emitters, self._all_lamps, self.background)
+
+    def background(self, directions: np.ndarray) -> np.ndarray:
+        """(N, 3) radiance of the world along ``directions`` (N, 3), as rays see it."""
+        face, row, column = direction_to_texel(directions, self.settings.face)
+        return self._world[(face * self.settings.face + row) * self.settings.face + column]
 
     # Which patch
     # ------------------------------------------------------------------------------------------------------------------
@@ -98,7 +107,7 @@ class ReferenceLight:
         apart = np.linalg.norm(hits[:, :3].astype(float) - leaders[:, :3], axis=1)
         ends = []
         for end in (hits, leaders):
-            point, normal = _split(end)
+            point, normal = split(end)
             ends.append(leave_surface(point, normal) + normal * (_RAISE * apart)[:, None])
         offset = ends[1] - ends[0]
         range_ = np.linalg.norm(offset, axis=1)
@@ -147,7 +156,7 @@ class ReferenceLight:
         luminance = np.zeros((count, len(numbers)))
         candidate_variance = np.zeros(len(numbers))
         for index in range(count):
-            point, normal = _split(points[numbers, 2 * index])
+            point, normal = split(points[numbers, 2 * index])
             for side, normals, side_keys, share in self._sides(normal, keys, numbers, sheets):
                 weight = share @ LUMINANCE
                 if part == EMITTERS:
@@ -182,7 +191,7 @@ class ReferenceLight:
         shift = (pcg3d(shifted(keys, 0, _PLACE_STREAM, 0))[:, 0] % each).astype(int)
         for index in range(samples):
             place = (index * each + shift) // samples if samples < each else index % each
-            point, normal = _split(points[numbers, place])
+            point, normal = split(points[numbers, place])
             for side, normals, side_keys, share in self._sides(normal, keys, numbers, sheets):
                 emitter_keys = shifted(side_keys, 0, 0, _EMITTER_STREAM)
                 origin = leave_surface(point[side], normals)
@@ -241,7 +250,7 @@ class ReferenceLight:
         the back."""
         patch, index = np.repeat(numbers, rays_each), np.tile(np.arange(rays_each), len(numbers))
         at = points[patch, index * points.shape[1] // rays_each % points.shape[1]]
-        point, normal = _split(at)
+        point, normal = split(at)
         through = self.scene.sheet_shares[np.zeros(len(patch), int) if sheets is None else sheets[patch]]
         crosses = through.any(axis=1) & (index % 2 == 1)
         normal[crosses] *= -1
@@ -257,17 +266,20 @@ class ReferenceLight:
             found = self.scene.closest(origin[alive], direction)
             surface = self.scene.resolve(found, direction, _RAY_SPREAD)
             missed = found.triangle < 0
-            face, row, column = direction_to_texel(direction, self.settings.face)
-            background = self._world[(face * self.settings.face + row) * self.settings.face + column]
             sampled = ~missed & (self.emitters.density[found.triangle] > 0)
-            seen = np.where(missed[:, None], background, np.where(sampled[:, None], 0.0, surface.emission))
-            carried[alive] += reflected[alive] * seen
-            reflected[alive] *= surface.albedo  # zero where a ray missed
+            emission = np.where(sampled[:, None], 0.0, surface.emission)
+            carried[alive] += reflected[alive] * np.where(missed[:, None], self.background(direction), emission)
             position = origin[alive] + direction * np.where(missed, 0.0, found.distance)[:, None]
-            sheet = np.where(missed, 0, self.scene.sheet[found.triangle])
+            ways = Ways(direction, surface, position, reflected[alive], carried[alive])
+            first = MOST_REFLECTIONS * segment
+            self.gloss.follow(ways, keys[alive], index[alive], first, MOST_REFLECTIONS, PATCH_BLUR, _RAY_SPREAD)
+            direction, surface, position, carried[alive] = ways.direction, ways.surface, ways.position, ways.brought
+            reflected[alive] = ways.throughput * surface.albedo  # zero where a ray missed
+            missed = surface.triangle < 0
+            sheet = np.where(missed, 0, self.scene.sheet[surface.triangle])
             end_sheets[alive] = sheet
-            hits[alive, :3] = off_surface(position, direction, np.where(missed, 0.0, found.distance), sheet)
-            hits[alive, 3] = _pack(surface.normal, ~missed)
+            hits[alive, :3] = off_surface(position, direction, np.where(missed, 0.0, surface.distance), sheet)
+            hits[alive, 3] = pack(surface.normal, ~missed)
             if segment < segments - 1:
                 on = reflected[alive].any(axis=1)
                 alive, facing = alive[on], surface.normal[on]
@@ -276,7 +288,7 @@ class ReferenceLight:
                 for side, normals, side_keys, share in self._sides(facing, here, np.arange(len(alive)), sheet[on]):
                     towards = np.where((normals * facing[side]).sum(axis=1, keepdims=True) > 0, -1, 1)
                     start = step_off(
-                        position[on][side], normals, towards * direction[on][side], found.distance[on][side]
+                        position[on][side], normals, towards * direction[on][side], surface.distance[on][side]
                     )
                     arriving[side] += share * self._irradiance(
                         position[on][side], start, normals, side_keys, side_keys, index[alive][side]
@@ -288,7 +300,7 @@ class ReferenceLight:
                 reflected[alive] *= _side_weight(through, crosses)
                 turn = np.where(crosses, -1.0, 1.0)[:, None]
                 normal[alive] = turn * facing
-                origin[alive] = step_off(position[on], normal[alive], -turn * direction[on], found.distance[on])
+                origin[alive] = step_off(position[on], normal[alive], -turn * direction[on], surface.distance[on])
         hits[~reflected.any(axis=1)] = (0.0, 0.0, 0.0, -1.0)
         shape = (len(numbers), rays_each)
         return PatchRays(
@@ -313,6 +325,16 @@ class ReferenceLight:
         self._ends = np.concatenate(ends)
         self._brought = np.concatenate([rays.brought for rays in parts])
         self._reflected = np.concatenate([rays.reflected for rays in parts])
+
+    def bind_reflections(self, reflections: TexelReflections) -> np.ndarray:
+        """(P·X·K,) patches on which rays of glossy texels end, founded where there are none."""
+        ways, lit = reflections.ways, reflections.sent.any(axis=1)
+        hits, sheets = np.zeros((len(lit), 4), np.float32), np.where(lit, self.scene.sheet[ways.surface.triangle], 0)
+        distance = np.where(lit, ways.surface.distance, 0.0)
+        hits[:, :3] = off_surface(ways.position, ways.direction, distance, sheets)
+        hits[:, 3] = pack(ways.surface.normal, lit)
+        hits[~lit, :3] = 0.0
+        return self.patches.bind_ends(hits, 0, self._sees(hits), sheets)
 
     def _bind_ends(self, rays: PatchRays, round_: int) -> np.ndarray:
         hits = rays.hits.reshape(-1, 4).astype(np.float32)
@@ -360,18 +382,6 @@ def bounce(
     return direct + brought + coming.sum(axis=1) / counted[:, None]
 
 
-def _split(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and normals (C, 3 each) of places (C, 4), float64."""
-    at = at.astype(float)
-    return at[:, :3], unpack_normal(np.maximum(at[:, 3], 0.0))
-
-
-def off_surface(points: np.ndarray, directions: np.ndarray, distances: np.ndarray, sheets: np.ndarray) -> np.ndarray:
-    """Hit ``points`` (H, 3) as patches keep them: pulled back along their rays, but on the surface itself where that is
-    a sheet (H,), which rays leave on both sides."""
-    return np.where((sheets > 0)[:, None], points, pull_back(points, directions, distances))
-
-
 def _side_weight(through: np.ndarray, crosses: np.ndarray) -> np.ndarray:
     """(C, 3) weight of rays of which half go on from the back of their sheet, those that cross it (C,), where it shows
     the share ``through`` (C, 3) of its back; 1 for what is no sheet."""
@@ -382,10 +392,3 @@ def _side_weight(through: np.ndarray, crosses: np.ndarray) -> np.ndarray:
 def _number(index: np.ndarray) -> np.ndarray:
     """(C, 3) uint32 that adds ``index`` (C,) to the first component of keys."""
     return np.stack([index, 0 * index, 0 * index], axis=1).astype(np.uint32)
-
-
-def _pack(normals: np.ndarray, surface: np.ndarray) -> np.ndarray:
-    """(C,) packed ``normals`` (C, 3), −1 where there is no ``surface`` (C,)."""
-    packed = np.full(len(normals), -1.0)
-    packed[surface] = pack_normal(octahedral_encode(normals[surface]))
-    return packed

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .camera import Camera
+from .gloss import Gloss
 from .light_profiles import LightProfile
 
 NO_IMAGE = -1
@@ -42,7 +43,8 @@ class Material:
     metallic, transmission and mix weights took theirs. Emission is ``emission × emission texture`` and is
     radiance. A texel with alpha below ``alpha_threshold`` is a hole (0: no clip; DITHERED: with the chance 1 − alpha,
     see ``core.dithering``). Of the part that is sent back the share ``transmitted``, per channel, leaves on the other
-    side than that where the light arrived (see ``core.sheets``).
+    side than that where the light arrived (see ``core.sheets``); of the part of a material with ``gloss`` a share is
+    mirrored (see ``core.gloss``).
     """
 
     name: str
@@ -56,6 +58,7 @@ class Material:
     alpha: float = 1.0
     alpha_threshold: float = 0.0
     transmitted: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    gloss: Gloss | None = None
     unseen_by: int = 0  # sum of SHADOW_RAYS, DIFFUSE_RAYS and FROM_BEHIND: for these the surface is not there
     backface_culling: bool = False  # stated only; light transport treats every surface as two-sided, like Cycles
 

@@ -16,13 +16,15 @@ from ..core import lookup
 from ..core.blocks import Block
 from ..core.conventions import DEPTH_EDGE
 from ..core.cubemap import texel_solid_angles
-from ..core.emitters import PROBE_POINTS, PROBE_RAYS, sampling_density
+from ..core.emitters import sampling_density
 from ..core.grid import Grid
 from ..core.patches import gather_rays
 from ..core.scene_changes import SceneChanges
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..core.steps import Pace, Steps
+from .emission_pass import project_emitters
+from .gloss_pass import GlossPass
 from .gradient_pass import GradientPass
 from .patch_light import PatchLight
 from .places import Places
@@ -50,9 +52,9 @@ class _Hits:
     layers: int
 
 
-def probes_in_budget(settings: BakeSettings) -> int:
+def probes_in_budget(settings: BakeSettings, bytes_per_texel: int = BYTES_PER_TEXEL) -> int:
     """Probes whose texel surfaces fit the memory budget together."""
-    return max(1, (settings.memory_mib << 20) // (6 * settings.face**2 * BYTES_PER_TEXEL))
+    return max(1, (settings.memory_mib << 20) // (6 * settings.face**2 * bytes_per_texel))
 
 
 @dataclass
@@ -91,6 +93,7 @@ class GpuBackend:
         weights = np.zeros((self.face * self.face, 4), np.float32)
         weights[:, 0] = texel_solid_angles(self.face).ravel()
         self._texel_weights = upload(weights, "texels")
+        self.gloss = GlossPass(self.scene, self.face)
         self._gradient = GradientPass(settings.face, settings.bands, grid)
         self.world_texels = send_world(self.scene, snapshot.world, self.face)
         self.forget_patches()
@@ -100,9 +103,10 @@ class GpuBackend:
         self._probes_per_capture = max(1, min(layer_limit // 6, budget // 4 // (texels * _HIT_BYTES)))
         # Patches are found portion by portion, the same in every batch size: the memory budget changes no byte.
         self._portion = min(layer_limit, max(1, _TEXELS_AT_ONCE // texels))
-        fitting = max(1, min(layer_limit, budget // (texels * BYTES_PER_TEXEL)))
+        bytes_per_texel = BYTES_PER_TEXEL + self.gloss.bytes_per_texel
+        fitting = max(1, min(layer_limit, budget // (texels * bytes_per_texel)))
         self.probes_per_batch = max(fitting // self._portion, 1) * self._portion
-        self.probes_in_budget = probes_in_budget(settings)
+        self.probes_in_budget = probes_in_budget(settings, bytes_per_texel)
         self._hits: _Hits | None = None
         self._raster: RasterCapture | None = None
 
@@ -219,7 +223,8 @@ class GpuBackend:
 
     def statistics(self, surfaces: Surfaces, start: int = 0, count: int | None = None) -> None:
         """Depth moments and what all or ``count`` probes from ``start`` see as a whole. Needs direct light."""
-        shader = program("probe_statistics_comp", FACE=self.face)
+        shader = program("probe_statistics_comp", FACE=self.face, **self.gloss.defines)
+        self.gloss.bind(shader, surfaces.textures, self.light.direct)
         shader.uniform_sampler("texel_weights", self._texel_weights)
         shader.uniform_sampler("shells", self._shells)
         shader.uniform_sampler("patch_irradiance", self.light.direct)
@@ -269,6 +274,7 @@ class GpuBackend:
 
     def _bind_portion(self, surfaces: Surfaces, start: int, count: int) -> None:
         first = surfaces.first + start
+        self.reflect(surfaces, start, count)
         texels = self._texel_hits(surfaces, start, count)
         patches = self.light.patches.bind_texels(texels, self.face, self.probe_slots, first, count)
         shader = program("texel_patches_comp", FACE=self.face)
@@ -276,6 +282,11 @@ class GpuBackend:
         shader.image("albedo", surfaces.textures["albedo"])
         shader.uniform_int("first_layer", (start,))
         self._dispatch_texels(shader, count)
+
+    def reflect(self, surfaces: Surfaces, start: int, count: int) -> None:
+        """Finds what glossy texels of ``count`` probes from ``start`` mirror."""
+        where = (start, count, surfaces.count), self.probe_slots, surfaces.first + start
+        self.gloss.reflect(surfaces.textures, *where, self.settings.seed, self.world_texels, self.light.patches)
 
     def _texel_hits(self, surfaces: Surfaces, start: int, count: int) -> Places:
         """Where texels meet surface, as one linear array."""
@@ -321,8 +332,10 @@ class GpuBackend:
             BANDS=self.settings.bands,
             COEFFICIENTS=self.coefficients,
             GROUP=_GROUP,
+            **self.gloss.defines,
         )
         listed = numbers(layers_, "probes")
+        self.gloss.bind(shader, surfaces.textures, self.light.irradiance)
         shader.uniform_sampler("probe_layers", listed)
         shader.uniform_sampler("texel_weights", self._texel_weights)
         shader.uniform_sampler("patch_irradiance", irradiance)
@@ -336,7 +349,8 @@ class GpuBackend:
         layers_and_count = (listed, len(layers_))
         add_suns(self.scene, self.settings, self.probe_slots, surfaces.first, layers_and_count, self._field)
         where = surfaces.textures, surfaces.first, layers_and_count
-        self._gradient.project(*where, self._texel_weights, irradiance, own_texels, _GROUP)
+        how = self._texel_weights, irradiance, own_texels, _GROUP, self.gloss, self.light.irradiance
+        self._gradient.project(*where, *how)
 
     def forget_emission(self) -> None:
         """No probe sees a sampled emitter."""
@@ -345,31 +359,9 @@ class GpuBackend:
 
     def find_emission(self, surfaces: Surfaces, layers_: np.ndarray) -> None:
         """What the probes in ``layers_`` (L,) see of sampled emitters; ``project`` and ``gather`` add it."""
-        shader = program(
-            "emission_project_comp",
-            FACE=self.face,
-            BANDS=self.settings.bands,
-            COEFFICIENTS=self.coefficients,
-            GROUP=_GROUP,
-            GRADIENT_COEFFICIENTS=self._gradient.coefficients,
-            CANDIDATE_COUNT=PROBE_POINTS,
-            **self.scene.light_defines,
-        )
-        self.scene.bind_surfaces(shader)
-        self.scene.bind_emitters(shader)
-        listed = numbers(layers_, "probes")
-        shader.uniform_sampler("probe_slots", self.probe_slots)
-        shader.uniform_sampler("probe_layers", listed)
-        shader.uniform_sampler("texel_weights", self._texel_weights)
-        for name in ("geometry", "emission"):
-            shader.uniform_sampler(name, surfaces.textures[name])
-        shader.image("emitted", self._emitted)
-        shader.image("emitted_gradient", self._gradient.emitted)
-        shader.uniform_float("nearest", self._gradient.nearest)
-        shader.uniform_int("first_slot", (surfaces.first,))
-        shader.uniform_int("samples", (PROBE_RAYS,))
-        shader.uniform_int("seed", (self.settings.seed,))
-        gpu.compute.dispatch(shader, len(layers_), 1, 1)
+        layers_and_count = numbers(layers_, "probes"), len(layers_)
+        where = self.probe_slots, surfaces.first, surfaces.textures, layers_and_count
+        project_emitters(self.scene, self.settings, where, self._texel_weights, self._gradient, self._emitted, _GROUP)
 
     @property
     def slot_count(self) -> int:

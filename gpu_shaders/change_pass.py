@@ -42,9 +42,10 @@ def resolve_again(backend: GpuBackend, surfaces: Surfaces, new_numbers: np.ndarr
     ``new_numbers`` (T,): new number of each old triangle in leaf order, −1 for none; None where numbers stayed. Returns
     whether a texel that reflected nothing now does, or the other way round.
     """
-    defines = backend.scene.surface_defines | {"RENUMBER": new_numbers is not None}
+    defines = backend.scene.surface_defines | backend.scene.gloss_defines | {"RENUMBER": new_numbers is not None}
     shader = program("surface_again_comp", FACE=backend.face, **defines)
     backend.scene.bind_surfaces(shader)
+    backend.scene.bind_gloss(shader)
     shader.uniform_sampler("probe_slots", backend.probe_slots)
     shader.uniform_sampler("world_texels", backend.world_texels)
     if new_numbers is not None:

@@ -138,7 +138,7 @@ def surface_resolve_comp(info, defines):
 
 def object_sightings_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
-    slot = _samplers(info, "patch_irradiance", "triangle_attributes")
+    slot = _mirrored(info, defines, _samplers(info, "patch_irradiance", "triangle_attributes"))
     _samplers(info, "geometry", "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "sightings")
     info.local_group_size(96, 1, 1)
@@ -158,6 +158,7 @@ def probe_statistics_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
     info.define("DEPTH_EDGE", str(DEPTH_EDGE))
     slot = _samplers(info, "texel_weights", "shells", "patch_irradiance", "triangle_attributes")
+    slot = _mirrored(info, defines, slot)
     _samplers(info, "geometry", "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "depth_moments", pixel="RG32F")
     _image(info, 1, "probe_shares")
@@ -185,6 +186,11 @@ def _light_files(defines: dict) -> list[str]:
     return ["random_lib", *surfaces, "offset_lib", "ray_lib", "direct_light_lib", *emitters]
 
 
+def _mirrored(info, defines: dict, first: int) -> int:
+    """What texel_light_lib reads of what texels mirror, where the scene has glossy surfaces."""
+    return _samplers(info, "mirrored", "mirrored_irradiance", first=first) if "REFLECTIONS" in defines else first
+
+
 def _group_sums(info, defines: dict) -> None:
     info.define("SUMS", "COEFFICIENTS")
     info.local_group_size(int(defines["GROUP"]), 1, 1)
@@ -192,6 +198,7 @@ def _group_sums(info, defines: dict) -> None:
 
 def field_project_comp(info, defines):
     slot = _samplers(info, "probe_layers", "texel_weights", "patch_irradiance", "emitted")
+    slot = _mirrored(info, defines, slot)
     _samplers(info, "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "field")
     _ints(info, "first_slot", "own_texels")
@@ -202,6 +209,7 @@ def field_project_comp(info, defines):
 def field_gradient_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
     slot = _samplers(info, "probe_layers", "texel_edges", "texel_weights", "patch_irradiance", "emitted_gradient")
+    slot = _mirrored(info, defines, slot)
     _samplers(info, "geometry", "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "field_gradient")
     _ints(info, "first_slot", "own_texels")
@@ -282,54 +290,6 @@ def patch_mean_comp(info, defines):
     _ints(info, "begins")
     info.local_group_size(64, 1, 1)
     return {"compute": ["data_lib", "patch_lists_lib", "patch_mean_comp"]}
-
-
-def patch_rays_comp(info, defines):
-    is_path = int(defines["SEGMENTS"]) > 1
-    slot = _scene(info, defines)
-    if is_path:
-        slot = _emitters(info, defines, slot)
-        _ints(info, "light_count")
-        slot = _samplers(info, "lights", first=slot)
-    slot = _samplers(info, "patch_points", "world_texels", first=slot)
-    _sheets(info, defines, slot, "sheet_numbers")
-    _image(info, 0, "hits")
-    _image(info, 1, "carried")
-    _image(info, 2, "reflected")
-    if "HAS_SHEETS" in defines:
-        _image(info, 3, "hit_sheets", pixel="R32F")
-    _ints(info, "first_ray", "ray_count", "rays_each", "first_key", "seed")
-    info.local_group_size(64, 1, 1)
-    return {
-        "compute": [
-            "data_lib",
-            "octahedral_lib",
-            "cubemap_lib",
-            *(
-                _light_files(defines | {"HAS_ALPHA": True})
-                if is_path
-                else ("random_lib", "surface_lib", "offset_lib", "ray_lib")
-            ),
-            *_sheet_files(defines),
-            "patch_rays_comp",
-        ]
-    }
-
-
-def patch_carried_comp(info, defines):
-    _samplers(info, "carried")
-    _image(info, 0, "brought")
-    _ints(info, "first_patch", "patch_count", "rays_each")
-    info.local_group_size(64, 1, 1)
-    return {"compute": ["data_lib", "patch_carried_comp"]}
-
-
-def patch_iterate_comp(info, defines):
-    _samplers(info, "direct", "brought", "reflected", "ray_ends", "irradiance_in")
-    _image(info, 0, "irradiance_out")
-    _ints(info, "patch_count", "rays_each", "bounce")
-    info.local_group_size(64, 1, 1)
-    return {"compute": ["data_lib", "patch_iterate_comp"]}
 
 
 def _one_group(info) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from ..core.emitters import PROBE_POINTS
 from ..core.gradients import gradient_bands, least_distance, texel_edges
 from ..core.grid import Grid
+from .gloss_pass import GlossPass
 from .programs import program
 from .textures import allocate, read, upload
 
@@ -55,10 +56,12 @@ class GradientPass:
         irradiance: gpu.types.GPUTexture,
         own_texels: bool,
         group: int,
+        gloss: GlossPass,
+        mirrored_irradiance: gpu.types.GPUTexture,
     ) -> None:
         """Gradients by the texel surfaces ``textures`` (geometry, albedo, emission) of ``layers``, a list and its
         length; ``first_slot`` is the slot of layer 0. ``irradiance`` is that of patches, or of every texel by itself
-        where ``own_texels``."""
+        where ``own_texels``; what they mirror is lit by ``mirrored_irradiance``, that of patches."""
         listed, count = layers
         shader = program(
             "field_gradient_comp",
@@ -67,7 +70,9 @@ class GradientPass:
             COEFFICIENTS=self.coefficients,
             GROUP=group,
             CANDIDATE_COUNT=PROBE_POINTS,
+            **gloss.defines,
         )
+        gloss.bind(shader, textures, mirrored_irradiance)
         shader.uniform_sampler("probe_layers", listed)
         shader.uniform_sampler("texel_edges", self._edges)
         shader.uniform_sampler("texel_weights", texel_weights)

@@ -139,7 +139,7 @@ def patch_points_comp(info, defines):
 
 
 def patch_seen_comp(info, defines):
-    slot = _samplers(info, "probe_layers")
+    slot = _samplers(info, "probe_layers", *(["mirrored"] if "REFLECTIONS" in defines else []))
     _samplers(info, "albedo", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "seen", pixel="R32F")
     return _linear(info, "patch_seen_comp")

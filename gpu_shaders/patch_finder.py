@@ -69,11 +69,14 @@ class PatchFinder:
         """No probe sees any patch, until ``mark_seen`` tells which do."""
         fill_elements(self.seen, 0, self.count, 0.0)
 
-    def mark_seen(self, albedo: gpu.types.GPUTexture, face: int, layers: np.ndarray) -> None:
-        """The patches that texels lie on of the probes in ``layers`` (L,) of texel surfaces with ``albedo``."""
-        shader, listed = program("patch_seen_comp", FACE=face), numbers(layers, "probes")
+    def mark_seen(self, textures: dict, face: int, layers: np.ndarray, gloss: dict) -> None:
+        """The patches that texels lie on, or mirror, of the probes in ``layers`` (L,) of the texel surfaces
+        ``textures``; ``gloss``: defines of those who read what texels mirror."""
+        shader, listed = program("patch_seen_comp", FACE=face, **gloss), numbers(layers, "probes")
+        if gloss:
+            shader.uniform_sampler("mirrored", textures["mirrored"])
         shader.uniform_sampler("probe_layers", listed)
-        shader.uniform_sampler("albedo", albedo)
+        shader.uniform_sampler("albedo", textures["albedo"])
         shader.image("seen", self.seen)
         gpu.compute.dispatch(shader, len(layers), 1, 1)
 

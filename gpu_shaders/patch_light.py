@@ -151,7 +151,10 @@ class PatchLight:
         sheets = scratch(rays, "rays", "R32F") if self._scene.has_sheets else None
         is_path = segments > 1
         defines = (
-            self._scene.surface_defines | (self._scene.light_defines if is_path else {}) | self._scene.sheet_defines
+            self._scene.surface_defines
+            | (self._scene.light_defines if is_path or self._scene.has_gloss else {})
+            | self._scene.sheet_defines
+            | self._scene.gloss_defines
         )
         shader = program(
             "patch_rays_comp",
@@ -163,6 +166,7 @@ class PatchLight:
         self._scene.bind_surfaces(shader)
         if is_path:
             self._scene.bind_lights(shader)
+        self._scene.bind_gloss(shader, lights=not is_path)
         self._scene.bind_sheets(shader, places.sheets)
         if sheets is not None:
             shader.image("hit_sheets", sheets)

@@ -54,12 +54,14 @@ class ProbePaths:
 
     def _trace(self, first: int, count: int, bounces: int | None, seed: int) -> tuple[np.ndarray, np.ndarray]:
         scene, paths = self._scene, SETS * self.count * count
-        defines = scene.surface_defines | scene.light_defines | scene.sheet_defines | {"HAS_IMAGES": scene.has_images}
+        defines = scene.surface_defines | scene.light_defines | scene.sheet_defines | scene.gloss_defines
+        defines |= {"HAS_IMAGES": scene.has_images}
         shader = program("probe_paths_comp", FACE=_FACE, **defines)
         directions, flux = (allocate(_PARTS * paths, "paths") for _ in range(2))
         scene.bind_surfaces(shader)
         scene.bind_lights(shader)
         scene.bind_sheets(shader)
+        scene.bind_gloss(shader)
         shader.uniform_sampler("probe_points", self._points)
         shader.uniform_sampler("world_texels", self._world)
         shader.image("directions", directions)

@@ -13,7 +13,8 @@ from .textures import allocate, numbers, read
 
 def sightings(backend: GpuBackend, surfaces: Surfaces) -> np.ndarray:
     """(count, 384): which objects each probe sees, see core/orientation.py. Needs direct light."""
-    shader = program("object_sightings_comp", FACE=backend.face)
+    shader = program("object_sightings_comp", FACE=backend.face, **backend.gloss.defines)
+    backend.gloss.bind(shader, surfaces.textures, backend.light.direct)
     result = allocate(surfaces.count * 96, "sightings")
     shader.uniform_sampler("patch_irradiance", backend.light.direct)
     backend.scene.bind(shader, "triangle_attributes")

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from .create_infos import NO_SURFACE, _image, _ints, _samplers, _scene
+from .gloss_create_infos import gloss, gloss_files
 
 
 def probe_reach_comp(info, defines):
@@ -26,14 +27,18 @@ def scatter_comp(info, defines):
 def surface_again_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
     slot = _scene(info, defines)
-    _samplers(info, "probe_slots", "world_texels", *(["new_numbers"] if "RENUMBER" in defines else []), first=slot)
+    names = ["new_numbers"] if "RENUMBER" in defines else []
+    gloss(info, defines, _samplers(info, "probe_slots", "world_texels", *names, first=slot))
     _image(info, 0, "geometry", layered=True, access="READ+WRITE")
     _image(info, 1, "albedo", layered=True, access="READ+WRITE")
     _image(info, 2, "emission", layered=True)
     _image(info, 3, "rebind", pixel="R32F")
     _ints(info, "first_slot")
     info.local_group_size(8, 8, 1)
-    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", "surface_lib", "surface_again_comp"]}
+    files = (
+        ["random_lib", "surface_lib", *gloss_files(defines, rays=False)] if "HAS_GLOSS" in defines else ["surface_lib"]
+    )
+    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *files, "surface_again_comp"]}
 
 
 def layers_move_comp(info, defines):

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..core import bvh, emitters
 from ..core.errors import InputError
+from ..core.gloss import gloss_rows
 from ..core.light_profiles import LightProfile
 from ..core.scene_changes import SceneChanges, ShapeChange, boxes_around
 from ..core.sheets import sheet_numbers
@@ -145,20 +146,21 @@ class SceneTextures:
         """Materials, sheets, emitters, and corners and attributes of all triangles or of those at ``only`` (K,) in leaf
         order."""
         for name, values in self._surface_rows(snapshot, density, slice(None) if only is None else only).items():
-            if only is None or name in ("materials", "sheets", "emitters"):
+            if only is None or name in ("materials", "sheets", "gloss_rows", "emitters"):
                 self._textures[name] = upload(values, name.replace("_", " "))
             elif len(only):
                 scatter_rows(self._textures[name], only, values)
 
     def _surface_rows(self, snapshot: SceneSnapshot, density: np.ndarray, at) -> dict[str, np.ndarray]:
-        """Textures' contents by name: materials, sheets, emitters, and corners and attributes of the triangles ``at``
-        in leaf order. Notes what of it decides about shaders."""
+        """Textures' contents by name: materials, sheets, gloss, emitters, and corners and attributes of the triangles
+        ``at`` in leaf order. Notes what of it decides about shaders."""
         order = self.hierarchy.order
         clips = np.array([m.alpha_threshold > 0 for m in snapshot.materials] or [False])
         unseen = np.array([m.unseen_by for m in snapshot.materials] or [0])
         self.has_alpha, self.has_unseen = bool(clips.any()), bool(unseen.any())
         sheet_of_material, shares = sheet_numbers(snapshot.materials)
         self.has_sheets = len(shares) > 1
+        self.has_gloss = any(material.gloss is not None for material in snapshot.materials)
         self._density = density[order]
         self.emitter_count = int(np.count_nonzero(self._density))
         self.emitter_reach = emitters.reach(self._density)
@@ -172,6 +174,7 @@ class SceneTextures:
         return {
             "materials": _materials(snapshot),
             "sheets": np.pad(shares, ((0, 0), (0, 1))).astype(np.float32),
+            "gloss_rows": gloss_rows([material.gloss for material in snapshot.materials]),
             "emitters": _emitters(self._density, self.corners, order),
             "triangle_corners": rows,
             "triangle_attributes": _attributes(snapshot, order[at], material, corners, self._density[at]),
@@ -210,6 +213,23 @@ class SceneTextures:
     def sheet_defines(self) -> dict:
         """For shaders that light patches or find them."""
         return {"HAS_SHEETS": self.has_sheets}
+
+    @property
+    def gloss_defines(self) -> dict:
+        """For shaders that follow mirrored light or ask what is glossy."""
+        return {"HAS_GLOSS": self.has_gloss}
+
+    def bind_gloss(self, shader, lights: bool = False) -> None:
+        """Binds what a shader compiled with ``gloss_defines`` declares beside surfaces; with ``lights`` also lamps and
+        emitters, for one that sees them mirrored and lights no points."""
+        if not self.has_gloss:
+            return
+        self.bind(shader, "gloss_rows")
+        if lights:
+            self.bind(shader, "lights")
+            shader.uniform_int("light_count", (self.lamp_count,))
+            if self.emitter_count:
+                self.bind_emitters(shader)
 
     def bind_sheets(self, shader, numbers=None) -> None:
         """Binds what a shader compiled with ``sheet_defines`` declares; ``numbers``: sheets of patches or texels."""

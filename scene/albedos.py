@@ -34,9 +34,14 @@ def fresnel_mean(ior: float) -> float:
     return (ior - 1) / (4.08567 + 1.00071 * ior) if ior > 1 else 0.0
 
 
+def facing_reflectance(ior: float, level: float = 0.5) -> float:
+    """Reflectance of the same at normal incidence."""
+    return min(((ior - 1) / (ior + 1)) ** 2 * 2 * max(level, 0.0), 0.99)
+
+
 def dielectric_albedo(ior: float, roughness: float, level: float = 0.5) -> float:
     """Specular reflectance of a Principled BSDF whose Specular IOR Level is ``level``."""
-    normal = min(((ior - 1) / (ior + 1)) ** 2 * 2 * max(level, 0.0), 0.99)
+    normal = facing_reflectance(ior, level)
     return float(_rough(np.array(fresnel_mean((1 + normal**0.5) / (1 - normal**0.5))), roughness))
 
 

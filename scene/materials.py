@@ -164,6 +164,7 @@ class MaterialTable:
                 alpha=opacity.number() if opacity.is_constant else 1.0,
                 alpha_threshold=0.0 if opacity.is_constant and opacity.number() > 1 - _LEAST_OPACITY else DITHERED,
                 transmitted=transmitted,
+                gloss=closure.mirrored.gloss(sent_back) if not any(transmitted) else None,
                 unseen_by=FROM_BEHIND if closure.one_sided else 0,
                 backface_culling=backface_culling,
             )

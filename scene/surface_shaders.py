@@ -4,10 +4,9 @@
 What each closure becomes is chosen so that the light that leaves the surface, summed over all directions, is as close
 to Cycles as a diffuse reflector with holes can be:
 
-- Diffuse, Subsurface, Toon, Sheen reflect diffusely what they send back in all. So do glossy nodes, metal
-  and the specular and coat layers of Principled (``albedos``): the energy is right, the direction is spread, which a
-  warning says where it matters. Black instead left a room with metal walls 70 % too dark, this is 3 % too
-  bright.
+- Diffuse, Subsurface, Toon, Sheen reflect diffusely what they send back in all. Of glossy nodes, metal and the specular
+  and coat layers of Principled the same is counted in (``albedos``), and which part of it is mirrored
+  (``gloss_lobes``), if that is enough and sharp enough to matter.
 - Translucent lets light through diffusely: what arrives on one side leaves on the other.
 - Glass, Refraction and the transmitting part of Principled let light through unbent and uncoloured: a hole. Thin panes
   are what such materials mostly are, and caustics of solid glass are beyond a light probe.
@@ -23,6 +22,7 @@ import numpy as np
 
 from .albedos import (
     dielectric_albedo,
+    facing_reflectance,
     glossy_albedo,
     layered,
     metal_albedo,
@@ -30,6 +30,7 @@ from .albedos import (
     sheen_albedo,
     tinted_coat,
 )
+from .gloss_lobes import NOTHING_MIRRORED, Mirrored, joined, mirrored_by
 from .node_links import Scope, Unsupported, find_socket, resolve
 from .shader_nodes import NodeEvaluator
 from .shader_values import ONE, ZERO, Value, add, apply, blend, complement, constant, multiply
@@ -40,7 +41,8 @@ DEFAULT_GREY = constant([0.8, 0.8, 0.8])
 @dataclass(frozen=True)
 class Closure:
     """``diffuse`` is the albedo of the part that is not hole, ``through`` what that part lets through diffusely,
-    ``opacity`` its share of the whole, ``emission`` radiance of the whole.
+    ``opacity`` its share of the whole, ``emission`` radiance of the whole. Of ``diffuse`` the part ``mirrored`` is not
+    diffuse at all.
     """
 
     diffuse: Value = constant([0.0, 0.0, 0.0])
@@ -48,6 +50,7 @@ class Closure:
     emission: Value = constant([0.0, 0.0, 0.0])
     through: Value = constant([0.0, 0.0, 0.0])
     one_sided: bool = False  # from behind nothing is there
+    mirrored: Mirrored = NOTHING_MIRRORED
 
 
 BLACK = Closure()
@@ -87,27 +90,41 @@ def _principled(evaluator, node, scope):
 
     roughness, metallic = value("Roughness").number(), _unit(value("Metallic"))
     through = _unit(value("Transmission Weight"))
-    share = dielectric_albedo(value("IOR").number(), roughness, value("Specular IOR Level").number())
+    ior, level = value("IOR").number(), value("Specular IOR Level").number()
+    share = dielectric_albedo(ior, roughness, level)
     albedo = rough_diffuse_albedo(value("Base Color"), value("Diffuse Roughness").number())
-    albedo = layered(value("Specular Tint").scaled(share), share, albedo)
+    specular, facing = (
+        value("Specular Tint").scaled(share),
+        value("Specular Tint").rgb() * facing_reflectance(ior, level),
+    )
+    albedo = layered(specular, share, albedo)
+    mirrored = mirrored_by(specular, facing, roughness)
     if not metallic.is_zero():
-        evaluator.notices.group("metal reflects its colour in all directions", evaluator.owner_name)
-        albedo = blend(metallic, albedo, metal_albedo(value("Base Color"), roughness))
+        metal = metal_albedo(value("Base Color"), roughness)
+        albedo = blend(metallic, albedo, metal)
+        facing = facing + (value("Base Color").rgb() - facing) * metallic.number()
+        mirrored = mirrored_by(blend(metallic, specular, metal), facing, roughness)
     opacity = _unit(value("Alpha"))
     if not through.is_zero():
         evaluator.notices.group("glass lets light through unbent and uncoloured", evaluator.owner_name)
         opacity = apply(lambda a, t, m: a * (1 - t * (1 - m)), opacity, through, metallic)
     coat = _unit(value("Coat Weight"))
     if not coat.is_zero():
-        share = coat.number() * dielectric_albedo(value("Coat IOR").number(), value("Coat Roughness").number())
+        ior, roughness = value("Coat IOR").number(), value("Coat Roughness").number()
+        share = coat.number() * dielectric_albedo(ior, roughness)
         albedo = layered(constant(share), share, tinted_coat(albedo, coat, value("Coat Tint")))
+        below = tinted_coat(mirrored.color, coat, value("Coat Tint")).scaled(1 - share)
+        mirrored = joined(
+            mirrored.of(below), mirrored_by(constant([share] * 3), np.full(3, facing_reflectance(ior)), roughness)
+        )
     sheen = _unit(value("Sheen Weight"))
     if not sheen.is_zero():
         share = sheen.number() * sheen_albedo(value("Sheen Roughness").number())
         albedo = layered(value("Sheen Tint").scaled(share), share, albedo)
+        mirrored = mirrored.of(mirrored.color.scaled(1 - share))
     strength = value("Emission Strength")
     emission = Closure.emission if strength.is_zero() else multiply(value("Emission Color"), strength)
-    return Closure(albedo, opacity, emission)
+    return Closure(albedo, opacity, emission, mirrored=mirrored)
 
 
 def _unit(value: Value) -> Value:
@@ -127,16 +144,17 @@ def _diffuse(evaluator, node, scope):
 
 
 def _glossy(evaluator, node, scope):
-    evaluator.notices.group("glossy shaders reflect their colour in all directions", evaluator.owner_name)
     roughness = evaluator.input(node, "Roughness", scope).number()
     if node.bl_idname == "ShaderNodeBsdfMetallic":
         color = evaluator.input(node, "Base Color", scope)
         if getattr(node, "fresnel_type", "") == "PHYSICAL_CONDUCTOR":
             evaluator.notices.group("physical conductors reflect a mean grey", evaluator.owner_name)
             color = constant([0.57, 0.53, 0.5])
-        return Closure(metal_albedo(color, roughness))
+        albedo = metal_albedo(color, roughness)
+        return Closure(albedo, mirrored=mirrored_by(albedo, color.rgb(), roughness))
     color = evaluator.input(node, "Color", scope)
-    return Closure(glossy_albedo(color, roughness, getattr(node, "distribution", "") == "MULTI_GGX"))
+    albedo = glossy_albedo(color, roughness, getattr(node, "distribution", "") == "MULTI_GGX")
+    return Closure(albedo, mirrored=mirrored_by(albedo, np.ones(3), roughness))
 
 
 def _sheen(evaluator, node, scope):
@@ -184,11 +202,19 @@ def _mix(evaluator, node, scope):
         factor = constant(share)
     else:
         factor = apply(lambda f: np.clip(f, 0, 1), factor)
+
+    def mixed(color: Value, other_color: Value) -> Value:
+        return _opaque_mix(factor, first.opacity, second.opacity, color, other_color)
+
+    none = constant([0.0, 0.0, 0.0])
     return Closure(
-        _opaque_mix(factor, first.opacity, second.opacity, first.diffuse, second.diffuse),
+        mixed(first.diffuse, second.diffuse),
         blend(factor, first.opacity, second.opacity),
         blend(factor, first.emission, second.emission),
-        _opaque_mix(factor, first.opacity, second.opacity, first.through, second.through),
+        mixed(first.through, second.through),
+        mirrored=joined(
+            first.mirrored.of(mixed(first.mirrored.color, none)), second.mirrored.of(mixed(none, second.mirrored.color))
+        ),
     )
 
 
@@ -213,7 +239,9 @@ def _add(evaluator, node, scope):
     first, second = (evaluate_shader(evaluator, item, scope) for item in node.inputs[:2])
     emission = add(first.emission, second.emission)
     if first.opacity.is_one() and second.opacity.is_one():
-        return Closure(add(first.diffuse, second.diffuse), ONE, emission, add(first.through, second.through))
+        through = add(first.through, second.through)
+        mirrored = joined(first.mirrored, second.mirrored)
+        return Closure(add(first.diffuse, second.diffuse), ONE, emission, through, mirrored=mirrored)
     opacity = apply(
         lambda a, b: np.clip(a + b - 1, 0, 1), first.opacity, second.opacity
     )  # what both let through adds up
@@ -229,7 +257,12 @@ def _add(evaluator, node, scope):
         )
 
     diffuse, through = (of_opaque(getattr(first, name), getattr(second, name)) for name in ("diffuse", "through"))
-    return Closure(diffuse, opacity, emission, through)
+    none = constant([0.0, 0.0, 0.0])
+    mirrored = joined(
+        first.mirrored.of(of_opaque(first.mirrored.color, none)),
+        second.mirrored.of(of_opaque(none, second.mirrored.color)),
+    )
+    return Closure(diffuse, opacity, emission, through, mirrored=mirrored)
 
 
 _SHADERS = {

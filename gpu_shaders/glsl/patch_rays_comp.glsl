@@ -4,6 +4,7 @@
  * patch; with SEGMENTS above 1 a ray goes on as a path, and direct light is sampled where it bounces.
  * Writes for each ray, counted from first_ray but for `reflected`: hits (position, packed normal; −1 where nothing more can come), `carried` (emission that points
  * on emitters do not answer for, or the world, and direct light at the bounces) and `reflected` (product of the albedos on the way).
+ * With HAS_GLOSS each of these ways goes on where it is mirrored, until it meets something diffuse.
  * Of patches on sheets every second ray leaves from the back; `hit_sheets` are those that rays end on.
  */
 
@@ -51,6 +52,15 @@ void main()
     }
     Surface surface = resolve_surface(hit.triangle, hit.barycentric, origin, direction, 0.5);
     brought += surface.emitter_density == 0.0 ? throughput * surface.emission : vec3(0.0);
+#ifdef HAS_GLOSS
+    Way way = Way(direction, hit, surface, throughput, brought);
+    follow_reflections(way, key, number, MOST_REFLECTIONS * segment, MOST_REFLECTIONS, PATCH_BLUR, 0.5);
+    direction = way.direction;
+    hit = way.hit;
+    surface = way.surface;
+    throughput = way.throughput;
+    brought = way.brought;
+#endif
     throughput *= surface.albedo;
     if (throughput == vec3(0.0)) {
       break;

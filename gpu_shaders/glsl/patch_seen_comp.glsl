@@ -1,4 +1,4 @@
-/* Marks the patches that texels of some probes lie on.
+/* Marks the patches that texels of some probes lie on; with REFLECTIONS also those that they mirror.
  *
  * Dispatch: one group of 64 threads a probe. probe_layers, 1 element a probe of the dispatch: its layer.
  */
@@ -11,5 +11,14 @@ void main()
     if (number >= 0.0) {
       imageStore(seen, element_position(int(number)), vec4(1.0));
     }
+#ifdef REFLECTIONS
+    int first = (layer * 6 * FACE * FACE + i) * (REFLECTIONS + 1);
+    for (int ray = 1; ray <= REFLECTIONS; ray++) {
+      float end = element(mirrored, first + ray).w;
+      if (end >= 0.0) {
+        imageStore(seen, element_position(int(end)), vec4(1.0));
+      }
+    }
+#endif
   }
 }

@@ -90,6 +90,15 @@ void main()
       radiance += surface.emission * (1.0 - share_of_points(surface.emitter_density, hit.distance, cosine));
     }
     behind = segment == 0 && surface.back ? 1.0 : behind;
+#ifdef HAS_GLOSS
+    Way way = Way(direction, hit, surface, throughput, radiance);
+    follow_reflections(way, own_key, 0, MOST_REFLECTIONS * segment, MOST_REFLECTIONS, segment == 0 ? TEXEL_BLUR : PATCH_BLUR, 0.1);
+    direction = way.direction;
+    hit = way.hit;
+    surface = way.surface;
+    throughput = way.throughput;
+    radiance = way.brought;
+#endif
     throughput *= surface.albedo;
     float survival = min(max(max(throughput.r, throughput.g), throughput.b), 1.0);
     if (survival == 0.0) {

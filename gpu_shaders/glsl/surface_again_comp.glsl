@@ -6,15 +6,6 @@
  * does, or the other way round: then patches must be found anew.
  */
 
-vec2 barycentric_of(int triangle, vec3 point)
-{
-  vec3 a = element(triangle_corners, 3 * triangle).xyz;
-  vec3 ab = element(triangle_corners, 3 * triangle + 1).xyz - a;
-  vec3 ac = element(triangle_corners, 3 * triangle + 2).xyz - a;
-  vec3 across = cross(ab, ac);
-  return vec2(dot(cross(point - a, ac), across), dot(cross(ab, point - a), across)) / dot(across, across);
-}
-
 void main()
 {
   ivec3 at = ivec3(gl_GlobalInvocationID);
@@ -38,7 +29,12 @@ void main()
   vec2 barycentric = barycentric_of(int(seen.w), origin + direction * abs(seen.z));
   Surface surface = resolve_surface(int(seen.w), barycentric, origin, direction, 2.0 / float(FACE));
   vec4 reflects = imageLoad(albedo, at);
-  if ((reflects.rgb != vec3(0.0)) != (surface.albedo != vec3(0.0))) {
+#ifdef HAS_GLOSS
+  bool is_glossy = gloss_of(int(seen.w)).share != vec3(0.0); /* other gloss than before is found by the host */
+#else
+  const bool is_glossy = false;
+#endif
+  if (!is_glossy && (reflects.rgb != vec3(0.0)) != (surface.albedo != vec3(0.0))) {
     imageStore(rebind, ivec2(0), vec4(1.0));
   }
   imageStore(albedo, at, vec4(surface.albedo, reflects.w));

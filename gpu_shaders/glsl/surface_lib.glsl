@@ -116,6 +116,16 @@ vec3 meet_plane(vec3 a, vec3 b, vec3 c, vec3 geometric, vec3 interpolated, vec3 
   return abs(distance - guess) < 0.01 * guess ? origin + direction * distance : interpolated;
 }
 
+/* Weights of corners 1 and 2 at a `point` of a triangle. */
+vec2 barycentric_of(int triangle, vec3 point)
+{
+  vec3 a = element(triangle_corners, 3 * triangle).xyz;
+  vec3 ab = element(triangle_corners, 3 * triangle + 1).xyz - a;
+  vec3 ac = element(triangle_corners, 3 * triangle + 2).xyz - a;
+  vec3 across = cross(ab, ac);
+  return vec2(dot(cross(point - a, ac), across), dot(cross(ab, point - a), across)) / dot(across, across);
+}
+
 /* Surface at `barycentric` of `triangle` seen along `direction`; `spread` is the angular width of the view, radians. */
 Surface resolve_surface(int triangle, vec2 barycentric, vec3 origin, vec3 direction, float spread)
 {

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What texels on glossy surfaces mirror, on the GPU: see core/gloss.py. Scenes without such surfaces have no part in
+it.
+
+Their rays are traced where texels are bound to patches, and end on patches as rays of rays do. Which part of whose
+irradiance a texel shows is kept with the surfaces; those who read the light of texels put it together.
+"""
+
+from __future__ import annotations
+
+import gpu
+
+from ..core.gloss import TEXEL_RAYS
+from .dispatch import dispatch_linear
+from .patch_finder import PatchFinder
+from .places import Places
+from .programs import program
+from .scene_textures import SceneTextures
+from .textures import allocate, scratch
+
+_BYTES_PER_TEXEL = 16 * (TEXEL_RAYS + 1)  # of a kept surface, beside what every surface takes
+
+
+class GlossPass:
+    """Reflections of the texels of one bake."""
+
+    def __init__(self, scene: SceneTextures, face: int):
+        self._scene, self._face = scene, face
+
+    @property
+    def bytes_per_texel(self) -> int:
+        """Of kept surfaces."""
+        return _BYTES_PER_TEXEL if self._scene.has_gloss else 0
+
+    @property
+    def defines(self) -> dict:
+        """For shaders that read the light of texels."""
+        return {"REFLECTIONS": TEXEL_RAYS} if self._scene.has_gloss else {}
+
+    def bind(self, shader, textures: dict, irradiance: gpu.types.GPUTexture) -> None:
+        """Hands a shader compiled with ``defines`` what the surfaces ``textures`` mirror, by the ``irradiance`` of
+        patches."""
+        if self._scene.has_gloss:
+            shader.uniform_sampler("mirrored", textures["mirrored"])
+            shader.uniform_sampler("mirrored_irradiance", irradiance)
+
+    def reflect(
+        self,
+        textures: dict,
+        layers: tuple[int, int, int],
+        probe_slots: gpu.types.GPUTexture,
+        first_slot: int,
+        seed: int,
+        world_texels: gpu.types.GPUTexture,
+        patches: PatchFinder,
+    ) -> None:
+        """Finds what glossy texels of some ``layers`` (first, count, number of all) of the surfaces ``textures``
+        mirror, and what they send back diffusely. Where rays end, ``patches`` are found. The slot of the first of these
+        layers is ``first_slot``."""
+        scene, face, (first, count, layer_count) = self._scene, self._face, layers
+        if not scene.has_gloss:
+            return
+        texels = count * 6 * face**2
+        rays = texels * TEXEL_RAYS
+        hits, reflected, carried = scratch(rays, "rays"), scratch(rays, "rays"), scratch(texels, "texels")
+        sheets = scratch(rays, "rays", "R32F") if scene.has_sheets else None
+        defines = scene.surface_defines | scene.light_defines | scene.sheet_defines | scene.gloss_defines
+        shader = program("texel_reflections_comp", FACE=face, **(defines | {"HAS_IMAGES": scene.has_images}))
+        scene.bind_surfaces(shader)
+        scene.bind_sheets(shader)
+        scene.bind_gloss(shader, lights=True)
+        shader.uniform_sampler("probe_slots", probe_slots)
+        shader.uniform_sampler("world_texels", world_texels)
+        shader.uniform_sampler("geometry", textures["geometry"])
+        shader.image("albedo", textures["albedo"])
+        for name, texture in (("hits", hits), ("reflected", reflected), ("carried", carried)):
+            shader.image(name, texture)
+        if sheets is not None:
+            shader.image("hit_sheets", sheets)
+        for name, value in (("first_slot", first_slot), ("first_layer", first), ("seed", seed)):
+            shader.uniform_int(name, (value,))
+        gpu.compute.dispatch(shader, -(-face // 8), -(-6 * face // 8), count)
+        ends = patches.bind_ends(Places(hits, 1, sheets), rays, 0)
+        if "mirrored" not in textures:
+            textures["mirrored"] = allocate(layer_count * 6 * face**2 * (TEXEL_RAYS + 1), "texels")
+        shader = program("texel_mirrored_comp", REFLECTIONS=TEXEL_RAYS)
+        for name, texture in (("ends", ends), ("reflected", reflected), ("carried", carried)):
+            shader.uniform_sampler(name, texture)
+        shader.image("mirrored", textures["mirrored"])
+        shader.image("seen", patches.seen)
+        shader.uniform_int("first_texel", (first * 6 * face**2,))
+        shader.uniform_int("texel_count", (texels,))
+        dispatch_linear(shader, texels)

@@ -1,0 +1,188 @@
+/* Lamps and sampled emitters as glossy surfaces see them: met by mirrored rays, and by points on them, each to its share.
+ *
+ * Reference: core/reference_gloss.py. A lamp is met where sample_plain_light would have put a sample.
+ */
+
+/* Steradians, roughly, by the lamp's size and the distance of its middle. */
+float lamp_extent(int light, vec3 point)
+{
+  int kind = int(element(lights, 6 * light).w);
+  float radius = element(lights, 6 * light + 1).w;
+  if (kind == SUN) {
+    return 6.283185307179586 * radius;
+  }
+  float area = 3.141592653589793 * radius * radius;
+  if (kind >= RECTANGLE) {
+    area = element(lights, 6 * light + 2).w * element(lights, 6 * light + 3).w * (kind == ELLIPSE ? 0.7853981633974483 : 1.0);
+  }
+  vec3 to_centre = element(lights, 6 * light).xyz - point;
+  return area / max(dot(to_centre, to_centre), 1.0e-20);
+}
+
+/* Radiance of a lamp that a ray meets nearer than `limit`. */
+vec3 lamp_met(int light, vec3 point, vec3 direction, float limit)
+{
+  vec4 position_kind = element(lights, 6 * light);
+  vec4 color_radius = element(lights, 6 * light + 1);
+  vec4 back = element(lights, 6 * light + 4);
+  vec4 parameters = element(lights, 6 * light + 5);
+  int kind = int(position_kind.w);
+  float radius = color_radius.w;
+  if (radius == 0.0 && kind < RECTANGLE) {
+    return vec3(0.0);
+  }
+  if (kind == SUN) {
+    bool meets = limit == NO_HIT && 1.0 - dot(direction, back.xyz) < radius;
+    return meets ? color_radius.rgb / (3.141592653589793 * radius * (2.0 - radius)) : vec3(0.0);
+  }
+  vec3 to_centre = position_kind.xyz - point;
+  float distance, factor = 1.0;
+  if (kind >= RECTANGLE) {
+    float cosine = dot(direction, back.xyz);
+    if (cosine <= 1.0e-6) {
+      return vec3(0.0);
+    }
+    distance = dot(to_centre, back.xyz) / cosine;
+    vec4 right = element(lights, 6 * light + 2), up = element(lights, 6 * light + 3);
+    vec3 place = direction * distance - to_centre;
+    vec2 at = vec2(dot(place, right.xyz) / max(right.w, 1.0e-20), dot(place, up.xyz) / max(up.w, 1.0e-20));
+    if (distance <= 0.0 || (kind == ELLIPSE ? dot(at, at) >= 0.25 : max(abs(at.x), abs(at.y)) >= 0.5)) {
+      return vec3(0.0);
+    }
+    if (parameters.y > 0.0) {
+      factor = max((parameters.x - sqrt(max(1.0 - cosine * cosine, 0.0)) / cosine) * parameters.y, 0.0);
+    }
+  }
+  else {
+    float squared = dot(to_centre, to_centre), along = dot(to_centre, direction), size = radius * radius;
+    if (along <= 0.0) {
+      return vec3(0.0);
+    }
+    if (parameters.z != 0.0 || squared <= size) {
+      distance = squared / along;
+      if (distance * distance - squared >= size) {
+        return vec3(0.0);
+      }
+    }
+    else {
+      float aside = squared - along * along;
+      if (aside >= size) {
+        return vec3(0.0);
+      }
+      distance = along - sqrt(size - aside);
+    }
+    factor = 0.3183098861837907 / size;
+    if (kind == SPOT) {
+      factor *= spot_mask(light, direction, back.xyz, parameters);
+    }
+  }
+  if (distance >= limit) {
+    return vec3(0.0);
+  }
+  vec3 radiance = color_radius.rgb * factor;
+#ifdef HAS_PROFILES
+  int profile = int(parameters.w);
+  if (profile > 0) {
+    radiance *= profile_factor(light, profile, direction, distance);
+  }
+#endif
+  return radiance;
+}
+
+/* Radiance of all lamps along a mirrored ray that ends at `limit`, by the share that rays answer for. */
+vec3 lamps_met(vec3 point, vec3 direction, float limit)
+{
+  vec3 sum = vec3(0.0);
+  for (int light = 0; light < light_count; light++) {
+    vec3 radiance = lamp_met(light, point, direction, limit);
+    if (radiance != vec3(0.0)) {
+      sum += radiance * (1.0 - share_of_points_on(lamp_extent(light, point)));
+    }
+  }
+  return sum;
+}
+
+/* Radiance that a glossy surface sends to `view` by light of points on lamps: sample `index` of the sequences of `key`. */
+vec3 lamps_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float blur, uvec3 key, int index)
+{
+  vec3 sum = vec3(0.0);
+  for (int light = 0; light < light_count; light++) {
+    vec2 u = sample_r2(key + uvec3(0u, 0u, uint(light) * 0x9E3779B9u), index);
+    LightSample light_sample = sample_light(light, surface.position, u);
+    vec3 radiance = gloss_lobe(gloss, surface, view, light_sample.direction, blur) * light_sample.irradiance *
+                    share_of_points_on(lamp_extent(light, surface.position));
+    if (radiance == vec3(0.0)) {
+      continue;
+    }
+    bool shadow = element(lights, 6 * light + 4).w != 0.0;
+    if (!shadow || !trace_any(origin, light_sample.direction, light_sample.distance * 0.9999)) {
+      sum += radiance;
+    }
+  }
+  return sum;
+}
+
+#ifdef HAS_EMITTERS
+/* Steradians that each of CANDIDATES points on an emitter stands for. */
+float emitter_extent(float density, float distance, float emitter_cosine)
+{
+  return emitter_cosine / (float(CANDIDATES) * density * distance * distance);
+}
+
+/* The same by points on sampled emitters, of which one gets a ray: as emitter_points_irradiance. */
+vec3 emitters_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float blur, uvec3 key, int index)
+{
+  vec3 best_radiance = vec3(0.0), best_point = vec3(0.0);
+  float best_weight = 0.0, total = 0.0;
+  float choice = sample_r3(key + uvec3(0x68E31DA4u, 0u, 0u), index).x;
+  for (int i = 0; i < CANDIDATES; i++) {
+    EmitterSample emitter = sample_emitter(sample_r3(key, index * CANDIDATES + i));
+    vec3 offset = emitter.point - surface.position;
+    float squared = max(dot(offset, offset), 1.0e-20);
+    float distance = sqrt(squared);
+    vec3 direction = offset / distance;
+    float cosine = abs(dot(direction, emitter.normal));
+    vec3 radiance = emitter.radiance * gloss_lobe(gloss, surface, view, direction, blur) *
+                    (cosine / (squared * emitter.density) * share_of_points_on(emitter_extent(emitter.density, distance, cosine)));
+    float weight = radiance.r + radiance.g + radiance.b;
+    total += weight;
+    if (weight > 0.0 && choice * total < weight) {
+      choice = choice * total / weight;
+      best_radiance = radiance;
+      best_point = emitter.point;
+      best_weight = weight;
+    }
+    else if (total > weight) {
+      choice = (choice * total - weight) / (total - weight);
+    }
+  }
+  vec3 way = best_point - origin;
+  float way_length = max(length(way), 1.0e-20);
+  if (best_weight == 0.0 || trace_any(origin, way / way_length, way_length * 0.9999)) {
+    return vec3(0.0);
+  }
+  return best_radiance * (total / (best_weight * float(CANDIDATES)));
+}
+#endif
+
+vec3 light_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float blur, uvec3 event)
+{
+  uvec3 key = event + uvec3(0u, LIGHT_STREAM, 0u);
+  vec3 radiance = lamps_in_gloss(gloss, surface, origin, view, blur, key, 0);
+#ifdef HAS_EMITTERS
+  radiance += emitters_in_gloss(gloss, surface, origin, view, blur, key + uvec3(0u, 0u, 0x2545F491u), 0);
+#endif
+  return radiance;
+}
+
+/* Of a sampled emitter that a mirrored ray meets, the share that rays answer for. */
+float emitter_share_of_rays(Surface surface, int triangle, vec3 direction, float distance)
+{
+#ifdef HAS_EMITTERS
+  if (surface.emitter_density > 0.0) {
+    float cosine = abs(dot(direction, triangle_normal(triangle, -direction)));
+    return 1.0 - share_of_points_on(emitter_extent(surface.emitter_density, distance, cosine));
+  }
+#endif
+  return 1.0;
+}

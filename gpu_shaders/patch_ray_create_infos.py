@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bindings of the shaders that carry light between patches: patch_light.py. Same form as create_infos.py."""
+
+from __future__ import annotations
+
+from .create_infos import _emitters, _image, _ints, _light_files, _samplers, _scene, _sheet_files, _sheets
+from .gloss_create_infos import gloss, gloss_files
+
+
+def patch_rays_comp(info, defines):
+    lights_points = int(defines["SEGMENTS"]) > 1 or "HAS_GLOSS" in defines
+    slot = _scene(info, defines)
+    if lights_points:
+        slot = _emitters(info, defines, slot)
+        _ints(info, "light_count")
+        slot = _samplers(info, "lights", first=slot)
+    slot = _samplers(info, "patch_points", "world_texels", first=slot)
+    slot = _sheets(info, defines, slot, "sheet_numbers")
+    gloss(info, defines, slot)
+    _image(info, 0, "hits")
+    _image(info, 1, "carried")
+    _image(info, 2, "reflected")
+    if "HAS_SHEETS" in defines:
+        _image(info, 3, "hit_sheets", pixel="R32F")
+    _ints(info, "first_ray", "ray_count", "rays_each", "first_key", "seed")
+    info.local_group_size(64, 1, 1)
+    return {
+        "compute": [
+            "data_lib",
+            "octahedral_lib",
+            "cubemap_lib",
+            *(
+                _light_files(defines | {"HAS_ALPHA": True})
+                if lights_points
+                else ("random_lib", "surface_lib", "offset_lib", "ray_lib")
+            ),
+            *gloss_files(defines),
+            *_sheet_files(defines),
+            "patch_rays_comp",
+        ]
+    }
+
+
+def patch_carried_comp(info, defines):
+    _samplers(info, "carried")
+    _image(info, 0, "brought")
+    _ints(info, "first_patch", "patch_count", "rays_each")
+    info.local_group_size(64, 1, 1)
+    return {"compute": ["data_lib", "patch_carried_comp"]}
+
+
+def patch_iterate_comp(info, defines):
+    _samplers(info, "direct", "brought", "reflected", "ray_ends", "irradiance_in")
+    _image(info, 0, "irradiance_out")
+    _ints(info, "patch_count", "rays_each", "bounce")
+    info.local_group_size(64, 1, 1)
+    return {"compute": ["data_lib", "patch_iterate_comp"]}
