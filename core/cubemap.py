@@ -26,6 +26,15 @@ def texel_directions(face: int) -> np.ndarray:
     return directions / np.linalg.norm(directions, axis=-1, keepdims=True)
 
 
+def place_directions(texel: np.ndarray, place: np.ndarray, face: int) -> np.ndarray:
+    """(N, 3) unit directions through ``place`` (N, 2 or more; column, row; 0..1) of ``texel`` (N,), counted face by
+    face, row by row."""
+    side, row, column = texel // face**2, texel // face % face, texel % face
+    s, t = (np.stack([column, row]) + place[:, :2].T) * 2.0 / face - 1.0
+    directions = FACE_FORWARD[side] + s[:, None] * FACE_RIGHT[side] + t[:, None] * FACE_UP[side]
+    return directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+
+
 def texel_solid_angles(face: int) -> np.ndarray:
     """(face, face) exact solid angles of one face's texels, steradian; six faces sum to 4π to rounding.
 

@@ -6,7 +6,7 @@ pattern the same everywhere), the rest D = A − S leaves in all directions. Fac
 one reflects grows towards grazing angles (Schlick), scaled so that the mean over all directions stays S. What is not
 mirrored goes on to the diffuse part, so no light is lost or made:
 
-    F = S · (f + (1 − f)(1 − cos θ)⁵) / (f + (1 − f)/21)           θ: between view and facet, f: reflectance at θ = 0
+    F = S · (f + (1 − f)(1 − cos θ)⁵) / (f + (1 − f)·g)            θ: between view and facet, f: reflectance at θ = 0
     D' = D · (1 − F) / (1 − S)
 
 Directions are drawn from the facets that the view sees (Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical
@@ -14,9 +14,10 @@ Caps", HPG 2023) and kept with the chance that the way out is open, G₂/G₁ (H
 Function", JCGT 2014). So they have the shape of what leaves after one reflection and all of its energy, as Cycles'
 closures that preserve energy do.
 
-Lamps and sampled emitters are met by mirrored rays where they are large in sight, by points on them where they are
-small: each by its ``share_of_points``. For points the lobe is at least as wide as a blur, so that a mirror's image of a
-lamp that nothing would find by chance is a soft one (path space regularisation: Kaplanyan and Dachsbacher, CGF 2013).
+Lamps and sampled emitters are met by mirrored rays where they are large against the lobe, by points on them where they
+are small: each by its ``share_of_points``. For points the lobe is at least as wide as a blur, so that a mirror's image
+of a lamp that nothing would find by chance is a soft one (path space regularisation: Kaplanyan and Dachsbacher, CGF
+2013).
 
 Readable twin of gpu_shaders/glsl/gloss_lib.glsl. N places; vectors are unit length, views point to where light goes.
 """
@@ -32,8 +33,10 @@ from .sampling import pcg3d, tangent_frame
 
 MOST_REFLECTIONS = 8  # of a ray in a row; what the last one meets reflects in all directions
 TEXEL_RAYS = 4  # of a texel on a glossy surface
-TEXEL_BLUR, PATCH_BLUR = 0.1, 0.2  # least width α of lobes in which probes, and patches, see lamps
-WIDE = 0.1  # sr: lamps of this size are met by rays and by points to equal shares
+TEXEL_LOOKS = 64  # at lamps, of the same
+PATCH_BLUR = 0.2  # least width α of lobes in which patches see lamps
+# And probes: against how far facets that mirror one way turn from one side of a texel to the other, radians.
+TEXEL_BLUR = 0.4
 ATTEMPTS = 4  # to find a facet whose way out is open
 REFLECTION_STREAM = 0x4CF5AD43
 LIGHT_STREAM = 0x27D4EB2F
@@ -95,7 +98,7 @@ class GlossyPlaces:
         """(N, 3) what facets reflect that are seen at ``cosine`` (N,)."""
         facing = self.rows[:, 1, :3]
         grazing = np.clip(1 - cosine, 0, 1)[:, None] ** 5
-        shape = (facing + (1 - facing) * grazing) / (facing + (1 - facing) / 21)
+        shape = (facing + (1 - facing) * grazing) / (facing + (1 - facing) * mean_grazing(self.alpha)[:, None])
         return np.minimum(self._whole() * shape, 1.0)
 
     def _whole(self) -> np.ndarray:
@@ -136,10 +139,9 @@ class GlossyPlaces:
         share = np.where(whole < 0.999, (1 - mirrored) / np.maximum(1 - whole, 1e-3), 1.0)
         return (self.albedo - whole) * share
 
-    def lobe(self, towards: np.ndarray, blur: float) -> np.ndarray:
+    def lobe(self, towards: np.ndarray, alpha: np.ndarray) -> np.ndarray:
         """(N, 3) radiance sent to the view per unit of radiance and solid angle from ``towards`` (N, 3), cosine
-        included, by a lobe at least ``blur`` wide."""
-        alpha = np.maximum(self.alpha, blur)
+        included, by lobes of the width ``alpha`` (N,)."""
         out = np.maximum(np.einsum("ni,ni->n", self.view, self.normal), _LEAST_COSINE)
         arriving = np.einsum("ni,ni->n", towards, self.normal)
         half = self.view + towards
@@ -188,10 +190,18 @@ def single_albedo(alpha: np.ndarray) -> np.ndarray:
     return 1 - 0.62 * alpha**1.2
 
 
-def share_of_points(extent: np.ndarray) -> np.ndarray:
+def mean_grazing(alpha: np.ndarray) -> np.ndarray:
+    """(N,) mean of (1 − cos θ)⁵ over facets seen from everywhere: 1/21 where they lie flat, less where they turn to the
+    view. A fit to what ``GlossyPlaces.reflect`` draws, good to a tenth."""
+    return 1 / (21 + 204 * alpha**1.55)
+
+
+def share_of_points(extent: np.ndarray, width: np.ndarray) -> np.ndarray:
     """(N,) of the light of a lamp of ``extent`` (N,) steradians, or of an emitter of which each point stands for so
-    much, that points on it answer for; mirrored rays answer for the rest."""
-    return WIDE / (WIDE + extent)
+    much, that points on it answer for, where the lobe is of ``width`` α (N,); mirrored rays answer for the rest: they
+    find what fills a good part of the lobe."""
+    lobe = 4 * np.pi * width * width
+    return lobe / (lobe + extent)
 
 
 def unit_numbers(hashes: np.ndarray) -> np.ndarray:

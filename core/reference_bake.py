@@ -104,7 +104,7 @@ class ReferenceBake:
 
     def reflections(self, surfaces: Surfaces) -> TexelReflections:
         """What glossy texels mirror and send back diffusely; ``surfaces`` as captured."""
-        where = self.points(surfaces), self.directions, self.nodes, self.settings.face, self.settings.seed
+        where = self.positions, self.nodes, self.settings.face, self.settings.seed
         return texel_reflections(self.light.gloss, surfaces, *where)
 
     def mirrored(self, reflections: TexelReflections, ends: np.ndarray, irradiance: np.ndarray) -> np.ndarray:

@@ -13,11 +13,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from . import direct_light, rays
+from .cubemap import place_directions, texel_directions
 from .emitters import CANDIDATES
 from .gloss import (
     MOST_REFLECTIONS,
     PATCH_BLUR,
     TEXEL_BLUR,
+    TEXEL_LOOKS,
     TEXEL_RAYS,
     GlossyPlaces,
     Reflections,
@@ -30,12 +32,13 @@ from .gloss import (
 )
 from .rays import step_off
 from .reference_emitters import ReferenceEmitters
-from .reference_scene import ReferenceScene, Surfaces
+from .reference_scene import ReferenceScene, Surfaces, interpolate
 from .sampling import keys_of, light_keys, sample_r2, sample_r3, shifted
 from .snapshot import Light
 
 _TEXEL_STREAM, _EMITTER_STREAM, _CHOICE_STREAM = 0x165667B1, 0x2545F491, 0x68E31DA4
-_SHADOW_END = 0.9999  # of the distance to a light
+_PLACE_STREAM = 0x2C1B3C6D
+_SHADOW_END, _SIGHT_END = 0.9999, 0.999  # of the distance to a light, and to a place in a texel
 
 
 @dataclass
@@ -129,71 +132,68 @@ class ReferenceGloss:
             alive = alive[~diffuse]
             on = Reflections(*(value[~diffuse] for value in vars(reflections).values()))
             some = ways.at(alive)
-            self.go_on(some, places.at(~diffuse), on, chance[~diffuse], events[~diffuse], blur, spread)
+            some.throughput /= chance[~diffuse][:, None]
+            onwards = places.at(~diffuse)
+            width = np.maximum(onwards.alpha, blur)
+            some.brought += some.throughput * self.light(onwards, some, width, light_keys_of(events[~diffuse]))
+            self.go_on(some, on, width, True, spread)
             ways.put(alive, some)
 
-    def go_on(
-        self,
-        ways: Ways,
-        places: GlossyPlaces,
-        reflections: Reflections,
-        chance: np.ndarray,
-        events: np.ndarray,
-        blur: float,
-        spread: float,
-    ) -> None:
-        """``ways`` go on from ``places`` by ``reflections``, which they do with ``chance`` (N,)."""
-        point = ways.position
-        origin = step_off(point, places.normal, places.view, ways.surface.distance)
-        weight = ways.throughput / chance[:, None]
-        ways.brought += weight * self.light(places, point, origin, blur, light_keys_of(events))
-        ways.throughput = weight * reflections.mirrored
+    def go_on(self, ways: Ways, reflections: Reflections, width: np.ndarray, meets_lamps: bool, spread: float) -> None:
+        """``ways`` go on by ``reflections``, out of lobes of ``width`` (N,)."""
+        point, origin = ways.position, beginning(ways)
+        ways.throughput *= reflections.mirrored
         ways.direction = reflections.direction
         found = self.scene.closest(origin, ways.direction)
-        ways.brought += ways.throughput * self._lamps_met(point, ways.direction, found.distance)
+        if meets_lamps:
+            ways.brought += ways.throughput * self._lamps_met(point, ways.direction, found.distance, width)
         ways.surface = self.scene.resolve(found, ways.direction, spread)
         missed = found.triangle < 0
         ways.position = origin + ways.direction * np.where(missed, 0.0, found.distance)[:, None]
-        emission = ways.surface.emission * self._share_of_rays(ways, found)[:, None]
+        emission = ways.surface.emission * self._share_of_rays(ways, found, width)[:, None]
         ways.brought += ways.throughput * np.where(missed[:, None], self._world(ways.direction), emission)
         ways.throughput[missed] = 0.0
 
     # Light
     # ------------------------------------------------------------------------------------------------------------------
 
-    def light(
-        self, places: GlossyPlaces, point: np.ndarray, origin: np.ndarray, blur: float, keys: np.ndarray
-    ) -> np.ndarray:
-        """(N, 3) radiance that places send to their views by light of points on lamps and sampled emitters."""
-        sum_ = np.zeros_like(point)
-        world_point = point + self.scene.origin
+    def light(self, places: GlossyPlaces, ways: Ways, width: np.ndarray, keys: np.ndarray) -> np.ndarray:
+        """(N, 3) radiance that ``places`` send to their views by light of points on lamps and sampled emitters."""
+        light = self._lamps_in_gloss(places, ways, width, keys, np.zeros(len(width), int))
+        emitter_keys = shifted(keys, 0, 0, _EMITTER_STREAM)
+        return light + self._emitters_in_gloss(places, ways, width, emitter_keys, np.zeros(len(width), int))
+
+    def _lamps_in_gloss(self, places, ways, width, keys, index) -> np.ndarray:
+        sum_, origin = np.zeros_like(ways.position), beginning(ways)
+        point = ways.position + self.scene.origin
         for number, lamp in enumerate(self._lamps()):
-            sample = direct_light.sample_light(lamp, world_point, sample_r2(light_keys(keys, number), 0).astype(float))
-            share = share_of_points(direct_light.extent(lamp, world_point))[:, None]
-            radiance = places.lobe(sample.directions, blur) * sample.irradiance * share
+            sample = direct_light.sample_light(lamp, point, sample_r2(light_keys(keys, number), index).astype(float))
+            share = share_of_points(direct_light.extent(lamp, point), width)[:, None]
+            radiance = places.lobe(sample.directions, width) * sample.irradiance * share
             lit = radiance.any(axis=1)
             if lamp.casts_shadow:
                 ends = sample.distances[lit] * _SHADOW_END
                 lit[lit] = self.scene.visible(origin[lit], sample.directions[lit], ends)
             sum_[lit] += radiance[lit]
-        if self._emitters.count:
-            sum_ += self._points_on_emitters(places, point, origin, blur, shifted(keys, 0, 0, _EMITTER_STREAM))
         return sum_
 
-    def _points_on_emitters(self, places, point, origin, blur, keys) -> np.ndarray:
+    def _emitters_in_gloss(self, places, ways, width, keys, index) -> np.ndarray:
         """Resampled as in ReferenceEmitters."""
-        choice = sample_r3(shifted(keys, _CHOICE_STREAM, 0, 0), 0)[:, 0].astype(float)
+        point, origin = ways.position, beginning(ways)
+        if not self._emitters.count:
+            return np.zeros_like(point)
+        choice = sample_r3(shifted(keys, _CHOICE_STREAM, 0, 0), index)[:, 0].astype(float)
         best, best_point = np.zeros_like(point), np.zeros_like(point)
         best_weight, total = np.zeros(len(point)), np.zeros(len(point))
         for candidate in range(CANDIDATES):
-            emitter = self._emitters.sample(sample_r3(keys, candidate).astype(float))
+            emitter = self._emitters.sample(sample_r3(keys, index * CANDIDATES + candidate).astype(float))
             offset = emitter.point - point
             squared = np.maximum(np.einsum("ni,ni->n", offset, offset), 1e-20)
             direction = offset / np.sqrt(squared)[:, None]
             cosine = np.abs(np.einsum("ni,ni->n", direction, emitter.normal))
-            share = share_of_points(cosine / (CANDIDATES * emitter.density * squared))
+            share = share_of_points(cosine / (CANDIDATES * emitter.density * squared), width)
             factor = cosine / (squared * emitter.density) * share
-            radiance = emitter.radiance * places.lobe(direction, blur) * factor[:, None]
+            radiance = emitter.radiance * places.lobe(direction, width) * factor[:, None]
             weight = radiance.sum(axis=1)
             total += weight
             taken = (weight > 0) & (choice * total < weight)
@@ -209,15 +209,15 @@ class ReferenceGloss:
         result[lit] = best[lit] * (total[lit] / (best_weight[lit] * CANDIDATES))[:, None]
         return result
 
-    def _lamps_met(self, point: np.ndarray, direction: np.ndarray, limit: np.ndarray) -> np.ndarray:
+    def _lamps_met(self, point: np.ndarray, direction: np.ndarray, limit: np.ndarray, width: np.ndarray) -> np.ndarray:
         """(N, 3) radiance of lamps along mirrored rays, by the share that rays answer for."""
         world_point, sum_ = point + self.scene.origin, np.zeros_like(point)
         for lamp in self._lamps():
-            share = 1 - share_of_points(direct_light.extent(lamp, world_point))[:, None]
+            share = 1 - share_of_points(direct_light.extent(lamp, world_point), width)[:, None]
             sum_ += direct_light.met(lamp, world_point, direction, limit) * share
         return sum_
 
-    def _share_of_rays(self, ways: Ways, found: rays.Hits) -> np.ndarray:
+    def _share_of_rays(self, ways: Ways, found: rays.Hits, width: np.ndarray) -> np.ndarray:
         """(N,) of the emission of what they met that rays answer for."""
         share = np.ones(len(found.triangle))
         met = np.flatnonzero((found.triangle >= 0) & (self._emitters.density[found.triangle] > 0))
@@ -225,40 +225,127 @@ class ReferenceGloss:
             density = self._emitters.density[found.triangle[met]]
             geometric = self.places(ways.at(met)).geometric
             cosine = np.abs(np.einsum("ni,ni->n", ways.direction[met], geometric))
-            share[met] = 1 - share_of_points(cosine / (CANDIDATES * density * found.distance[met] ** 2))
+            share[met] = 1 - share_of_points(cosine / (CANDIDATES * density * found.distance[met] ** 2), width[met])
         return share
 
     # Texels
     # ------------------------------------------------------------------------------------------------------------------
 
-    def texels(
-        self, surfaces: Surfaces, points: np.ndarray, directions: np.ndarray, nodes: np.ndarray, face: int, seed: int
-    ):
-        """What texels mirror that see ``surfaces`` (P, X) at ``points`` (P, X, 3) along ``directions`` (X, 3), of the
-        probes of grid ``nodes`` (P,)."""
+    def texels(self, surfaces: Surfaces, positions: np.ndarray, nodes: np.ndarray, face: int, seed: int):
+        """What texels mirror that see ``surfaces`` (P, X) from ``positions`` (P, 3), of the probes of grid ``nodes``
+        (P,): numbers (R,) of the texels that rays leave, what surfaces send back diffusely beside them (R, 3), the rays
+        to their ends; numbers (G,) of all glossy texels and radiance (G, 3) that lamps send by way of them."""
         probes, texels = surfaces.triangle.shape
-        glossy = np.repeat(np.flatnonzero(self.is_glossy(surfaces.triangle)), TEXEL_RAYS)
-        ray = np.arange(len(glossy)) % TEXEL_RAYS
-        keys = keys_of(nodes[glossy // texels], _TEXEL_STREAM, seed)
-        numbers = (glossy % texels) * TEXEL_RAYS + ray
+        glossy = np.flatnonzero(self.is_glossy(surfaces.triangle))
         flat = Surfaces(
             *(value.reshape(probes * texels, *value.shape[2:])[glossy] for value in vars(surfaces).values())
         )
         zero = np.zeros((len(glossy), 3))
-        ways = Ways(directions[glossy % texels].copy(), flat, points.reshape(-1, 3)[glossy], zero + 1, zero.copy())
+        directions = texel_directions(face).reshape(-1, 3)[glossy % texels]
+        origin = positions[glossy // texels]
+        seen = Ways(directions, flat, origin + directions * flat.distance[:, None], zero + 1, zero.copy())
+        middle = _Middle(seen, self.places(seen), origin, glossy % texels, face, self.scene)
+        width = np.maximum(middle.places.alpha, middle.blur())
+        keys = keys_of(nodes[glossy // texels], _TEXEL_STREAM, seed)
+        looked = sum(self._look(middle, width, keys, (glossy % texels) * TEXEL_LOOKS + i) for i in range(TEXEL_LOOKS))
+        ray = np.tile(np.arange(TEXEL_RAYS), len(glossy))
+        each = np.repeat(np.arange(len(glossy)), TEXEL_RAYS)
+        diffuse, ways = self._send(middle.at(each), width[each], keys[each], (glossy[each] % texels) * TEXEL_RAYS + ray)
+        return glossy[each], diffuse, ways, glossy, looked / TEXEL_LOOKS
+
+    def _look(self, middle: _Middle, width: np.ndarray, keys: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+        """(G, 3) radiance that lamps send to texels by one place in each."""
+        ways, light_keys_ = middle.through(sample_r3(shifted(keys, 0, _PLACE_STREAM, 0), numbers)), light_keys_of(keys)
+        places = self.places(ways)
+        light = self._lamps_in_gloss(places, ways, width, light_keys_, numbers)
+        on = places.reflect(events_of(light_keys_, numbers, 0), sample_r2(light_keys_, numbers).astype(float))
+        far = np.full(len(width), np.inf)
+        meets = np.flatnonzero(self._lamps_met(ways.position, on.direction, far, width).any(axis=1))
+        some = ways.at(meets)
+        limit = self.scene.closest(beginning(some), on.direction[meets]).distance
+        met = self._lamps_met(some.position, on.direction[meets], limit, width[meets])
+        light[meets] += on.mirrored[meets] * met
+        light[middle.hides(ways, light.any(axis=1))] = 0.0
+        return light
+
+    def _send(self, middle: _Middle, width: np.ndarray, keys: np.ndarray, numbers: np.ndarray):
+        ways = middle.through(sample_r3(shifted(keys, 0, _PLACE_STREAM, 1), numbers))
+        hidden = np.flatnonzero(middle.hides(ways, np.ones(len(numbers), bool)))
+        ways.put(hidden, middle.ways.at(hidden))
         places, events = self.places(ways), events_of(keys, numbers, 0)
         reflections = places.reflect(events, sample_r2(keys, numbers).astype(float))
-        self.go_on(ways, places, reflections, np.ones(len(glossy)), events, TEXEL_BLUR, 2.0 / face)
-        self.follow(ways, keys, numbers, 1, MOST_REFLECTIONS - 1, PATCH_BLUR, 2.0 / face)
-        return glossy, reflections.diffuse, ways
+        emitter_keys = shifted(light_keys_of(keys), 0, 0, _EMITTER_STREAM)
+        ways.brought += self._emitters_in_gloss(places, ways, width, emitter_keys, numbers)
+        self.go_on(ways, reflections, width, False, 2.0 / middle.face)
+        self.follow(ways, keys, numbers, 1, MOST_REFLECTIONS - 1, PATCH_BLUR, 2.0 / middle.face)
+        return reflections.diffuse, ways
+
+
+@dataclass
+class _Middle:
+    """What glossy texels (G) see in their middle, and places around it on the planes of the same triangles."""
+
+    ways: Ways
+    places: GlossyPlaces
+    origin: np.ndarray  # (G, 3) of the probes
+    texel: np.ndarray  # (G,) of the probe
+    face: int
+    scene: ReferenceScene
+
+    def at(self, chosen: np.ndarray) -> _Middle:
+        ways, places = self.ways.at(chosen), self.places.at(chosen)
+        return _Middle(ways, places, self.origin[chosen], self.texel[chosen], self.face, self.scene)
+
+    def through(self, place: np.ndarray) -> Ways:
+        """The rays through ``place`` (G, 2 or more; 0..1) of the texels; the middle itself where the plane slants."""
+        ways = self.ways.at(np.arange(len(self.texel)))
+        direction = place_directions(self.texel, place.astype(float), self.face)
+        slope = np.einsum("ni,ni->n", self.places.geometric, direction)
+        ahead = np.einsum("ni,ni->n", self.places.geometric, ways.position - self.origin)
+        distance = ahead / np.where(slope < 0, slope, -1.0)
+        on = np.flatnonzero((slope <= -0.01) & (distance <= 2 * ways.surface.distance))
+        ways.direction[on], ways.surface.distance[on] = direction[on], distance[on]
+        ways.position[on] = self.origin[on] + distance[on, None] * direction[on]
+        ways.surface.normal[on] = self._normal(ways.at(on))
+        return ways
+
+    def _normal(self, ways: Ways) -> np.ndarray:
+        triangle = ways.surface.triangle
+        a, b, c = np.moveaxis(self.scene.triangles[triangle], 1, 0)
+        across = np.cross(b - a, c - a)
+        squared = np.einsum("ni,ni->n", across, across)
+        second = np.einsum("ni,ni->n", np.cross(ways.position - a, c - a), across) / squared
+        third = np.einsum("ni,ni->n", np.cross(b - a, ways.position - a), across) / squared
+        normal = interpolate(self.scene.snapshot.corner_normals[triangle], np.stack([second, third], axis=1))
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        return np.where(ways.surface.back[:, None], -normal, normal)
+
+    def blur(self) -> np.ndarray:
+        """(G,) least width of lobes in which texels see lamps."""
+        sides = (0.1, 0.5), (0.9, 0.5), (0.5, 0.1), (0.5, 0.9)
+        normals = [self.through(np.tile(side, (len(self.texel), 1))).surface.normal for side in sides]
+        bends = [np.linalg.norm(normals[i] - normals[i + 1], axis=1) for i in (0, 2)]
+        return TEXEL_BLUR * (np.pi / 4 / self.face + 1.25 * np.maximum(*bends))
+
+    def hides(self, ways: Ways, asked: np.ndarray) -> np.ndarray:
+        """(G,) bool: is something before those of ``ways`` that are ``asked`` (G,)?"""
+        result, ask = np.zeros(len(asked), bool), np.flatnonzero(asked)
+        limits = ways.surface.distance[ask] * _SIGHT_END
+        result[ask] = ~self.scene.visible(self.origin[ask], ways.direction[ask], limits)
+        return result
+
+
+def beginning(ways: Ways) -> np.ndarray:
+    """(N, 3) where rays begin that leave the surfaces that were met."""
+    return step_off(ways.position, ways.surface.normal, -ways.direction, ways.surface.distance)
 
 
 def texel_reflections(gloss: ReferenceGloss, surfaces: Surfaces, *how) -> TexelReflections:
     """``ReferenceGloss.texels`` for all texels of ``surfaces`` (P, X), with what they send back diffusely."""
     probes, texels = surfaces.triangle.shape
     rays_ = probes * texels * TEXEL_RAYS
-    glossy, diffuse, found = gloss.texels(surfaces, *how)
-    place = glossy * TEXEL_RAYS + np.arange(len(glossy)) % TEXEL_RAYS
+    texel, diffuse, found, glossy, looked = gloss.texels(surfaces, *how)
+    place = texel * TEXEL_RAYS + np.arange(len(texel)) % TEXEL_RAYS
     nothing = Surfaces(
         np.full(rays_, np.inf), np.full(rays_, -1), np.zeros(rays_, bool), *(np.zeros((rays_, 3)) for _ in range(3))
     )
@@ -266,6 +353,8 @@ def texel_reflections(gloss: ReferenceGloss, surfaces: Surfaces, *how) -> TexelR
     ways.put(place, found)
     albedo = surfaces.albedo.reshape(-1, 3).copy()
     albedo[glossy] = 0.0
-    np.add.at(albedo, glossy, diffuse / TEXEL_RAYS)
-    carried = ways.brought.reshape(probes, texels, TEXEL_RAYS, 3).mean(axis=2)
-    return TexelReflections(albedo.reshape(probes, texels, 3), carried, ways, ways.throughput * ways.surface.albedo)
+    np.add.at(albedo, texel, diffuse / TEXEL_RAYS)
+    carried = ways.brought.reshape(probes * texels, TEXEL_RAYS, 3).mean(axis=1)
+    carried[glossy] += looked
+    shape, sent = (probes, texels, 3), ways.throughput * ways.surface.albedo
+    return TexelReflections(albedo.reshape(shape), carried.reshape(shape), ways, sent)

@@ -10,8 +10,8 @@ from ..core.gloss import (
     PATCH_BLUR,
     REFLECTION_STREAM,
     TEXEL_BLUR,
+    TEXEL_LOOKS,
     TEXEL_RAYS,
-    WIDE,
 )
 from .create_infos import NO_SURFACE, _emitters, _image, _ints, _light_files, _samplers, _scene, _sheet_files, _sheets
 
@@ -22,7 +22,6 @@ _NUMBERS = {
     "LIGHT_STREAM": f"{LIGHT_STREAM}u",
     "PATCH_BLUR": PATCH_BLUR,
     "TEXEL_BLUR": TEXEL_BLUR,
-    "WIDE": WIDE,
 }
 
 
@@ -43,6 +42,7 @@ def gloss_files(defines: dict, rays: bool = True) -> list[str]:
 def texel_reflections_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
     info.define("REFLECTIONS", str(TEXEL_RAYS))
+    info.define("LOOKS", str(TEXEL_LOOKS))
     slot = gloss(info, defines, _emitters(info, defines, _scene(info, defines)))
     slot = _samplers(info, "lights", "probe_slots", "world_texels", first=slot)
     slot = _sheets(info, defines, slot)

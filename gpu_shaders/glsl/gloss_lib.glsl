@@ -47,7 +47,8 @@ vec3 mirrored_by_facet(Gloss gloss, vec3 albedo, float cosine)
 {
   float grazing = clamp(1.0 - cosine, 0.0, 1.0);
   grazing *= grazing * grazing * grazing * grazing;
-  vec3 shape = (gloss.facing + (1.0 - gloss.facing) * grazing) / (gloss.facing + (1.0 - gloss.facing) / 21.0);
+  float seldom = 1.0 / (21.0 + 204.0 * pow(gloss.alpha, 1.55));
+  vec3 shape = (gloss.facing + (1.0 - gloss.facing) * grazing) / (gloss.facing + (1.0 - gloss.facing) * seldom);
   return min(mirrored_in_all(gloss, albedo) * shape, vec3(1.0));
 }
 
@@ -108,14 +109,14 @@ Reflection reflect_at(Gloss gloss, Surface surface, int triangle, vec3 view, uve
   return reflection;
 }
 
-/* Radiance sent to the view per unit of radiance and solid angle from `towards`, cosine included. */
-vec3 gloss_lobe(Gloss gloss, Surface surface, vec3 view, vec3 towards, float blur)
+/* Radiance sent to the view per unit of radiance and solid angle from `towards`, cosine included, by a lobe of width `alpha`. */
+vec3 gloss_lobe(Gloss gloss, Surface surface, vec3 view, vec3 towards, float alpha)
 {
   float arriving = dot(towards, surface.normal);
   if (arriving <= 0.0) {
     return vec3(0.0);
   }
-  float alpha = max(gloss.alpha, blur), squared = alpha * alpha;
+  float squared = alpha * alpha;
   float leaving = max(dot(view, surface.normal), LEAST_FACET_COSINE);
   vec3 middle = normalize(view + towards);
   float height = dot(middle, surface.normal);
@@ -126,8 +127,10 @@ vec3 gloss_lobe(Gloss gloss, Surface surface, vec3 view, vec3 towards, float blu
   return mirrored_by_facet(gloss, surface.albedo, dot(view, middle)) * (spread / (masking * 4.0 * leaving * single));
 }
 
-/* Of the light of a lamp of so many steradians, or of an emitter of which each point stands for so many, what points answer for. */
-float share_of_points_on(float extent)
+/* Of the light of a lamp of so many steradians, or of an emitter of which each point stands for so many, what points answer for where the
+ * lobe is of this `width` α. */
+float share_of_points_on(float extent, float width)
 {
-  return WIDE / (WIDE + extent);
+  float lobe = 12.566370614359172 * width * width;
+  return lobe / (lobe + extent);
 }

@@ -89,28 +89,28 @@ vec3 lamp_met(int light, vec3 point, vec3 direction, float limit)
   return radiance;
 }
 
-/* Radiance of all lamps along a mirrored ray that ends at `limit`, by the share that rays answer for. */
-vec3 lamps_met(vec3 point, vec3 direction, float limit)
+/* Radiance of all lamps along a ray that ends at `limit` and was mirrored in a lobe of this width, by the share that rays answer for. */
+vec3 lamps_met(vec3 point, vec3 direction, float limit, float width)
 {
   vec3 sum = vec3(0.0);
   for (int light = 0; light < light_count; light++) {
     vec3 radiance = lamp_met(light, point, direction, limit);
     if (radiance != vec3(0.0)) {
-      sum += radiance * (1.0 - share_of_points_on(lamp_extent(light, point)));
+      sum += radiance * (1.0 - share_of_points_on(lamp_extent(light, point), width));
     }
   }
   return sum;
 }
 
 /* Radiance that a glossy surface sends to `view` by light of points on lamps: sample `index` of the sequences of `key`. */
-vec3 lamps_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float blur, uvec3 key, int index)
+vec3 lamps_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float width, uvec3 key, int index)
 {
   vec3 sum = vec3(0.0);
   for (int light = 0; light < light_count; light++) {
     vec2 u = sample_r2(key + uvec3(0u, 0u, uint(light) * 0x9E3779B9u), index);
     LightSample light_sample = sample_light(light, surface.position, u);
-    vec3 radiance = gloss_lobe(gloss, surface, view, light_sample.direction, blur) * light_sample.irradiance *
-                    share_of_points_on(lamp_extent(light, surface.position));
+    vec3 radiance = gloss_lobe(gloss, surface, view, light_sample.direction, width) * light_sample.irradiance *
+                    share_of_points_on(lamp_extent(light, surface.position), width);
     if (radiance == vec3(0.0)) {
       continue;
     }
@@ -130,7 +130,7 @@ float emitter_extent(float density, float distance, float emitter_cosine)
 }
 
 /* The same by points on sampled emitters, of which one gets a ray: as emitter_points_irradiance. */
-vec3 emitters_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float blur, uvec3 key, int index)
+vec3 emitters_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float width, uvec3 key, int index)
 {
   vec3 best_radiance = vec3(0.0), best_point = vec3(0.0);
   float best_weight = 0.0, total = 0.0;
@@ -142,8 +142,9 @@ vec3 emitters_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, flo
     float distance = sqrt(squared);
     vec3 direction = offset / distance;
     float cosine = abs(dot(direction, emitter.normal));
-    vec3 radiance = emitter.radiance * gloss_lobe(gloss, surface, view, direction, blur) *
-                    (cosine / (squared * emitter.density) * share_of_points_on(emitter_extent(emitter.density, distance, cosine)));
+    vec3 radiance = emitter.radiance * gloss_lobe(gloss, surface, view, direction, width) *
+                    (cosine / (squared * emitter.density) *
+                     share_of_points_on(emitter_extent(emitter.density, distance, cosine), width));
     float weight = radiance.r + radiance.g + radiance.b;
     total += weight;
     if (weight > 0.0 && choice * total < weight) {
@@ -165,23 +166,23 @@ vec3 emitters_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, flo
 }
 #endif
 
-vec3 light_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float blur, uvec3 event)
+vec3 light_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float width, uvec3 event)
 {
   uvec3 key = event + uvec3(0u, LIGHT_STREAM, 0u);
-  vec3 radiance = lamps_in_gloss(gloss, surface, origin, view, blur, key, 0);
+  vec3 radiance = lamps_in_gloss(gloss, surface, origin, view, width, key, 0);
 #ifdef HAS_EMITTERS
-  radiance += emitters_in_gloss(gloss, surface, origin, view, blur, key + uvec3(0u, 0u, 0x2545F491u), 0);
+  radiance += emitters_in_gloss(gloss, surface, origin, view, width, key + uvec3(0u, 0u, 0x2545F491u), 0);
 #endif
   return radiance;
 }
 
 /* Of a sampled emitter that a mirrored ray meets, the share that rays answer for. */
-float emitter_share_of_rays(Surface surface, int triangle, vec3 direction, float distance)
+float emitter_share_of_rays(Surface surface, int triangle, vec3 direction, float distance, float width)
 {
 #ifdef HAS_EMITTERS
   if (surface.emitter_density > 0.0) {
     float cosine = abs(dot(direction, triangle_normal(triangle, -direction)));
-    return 1.0 - share_of_points_on(emitter_extent(surface.emitter_density, distance, cosine));
+    return 1.0 - share_of_points_on(emitter_extent(surface.emitter_density, distance, cosine), width);
   }
 #endif
   return 1.0;

@@ -92,7 +92,7 @@ void main()
     behind = segment == 0 && surface.back ? 1.0 : behind;
 #ifdef HAS_GLOSS
     Way way = Way(direction, hit, surface, throughput, radiance);
-    follow_reflections(way, own_key, 0, MOST_REFLECTIONS * segment, MOST_REFLECTIONS, segment == 0 ? TEXEL_BLUR : PATCH_BLUR, 0.1);
+    follow_reflections(way, own_key, 0, MOST_REFLECTIONS * segment, MOST_REFLECTIONS, segment == 0 ? 0.03 : PATCH_BLUR, 0.1);
     direction = way.direction;
     hit = way.hit;
     surface = way.surface;

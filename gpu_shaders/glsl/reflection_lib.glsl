@@ -12,16 +12,22 @@ struct Way {
   vec3 brought;
 };
 
-/* The ray goes on from its surface by `reflection`, which it does with this chance. */
-void go_on(inout Way way, Gloss gloss, Reflection reflection, float chance, uvec3 event, float blur, float spread)
+/* Where rays begin that leave the surface that was met. */
+vec3 beginning(Way way)
 {
-  vec3 view = -way.direction, point = way.surface.position;
-  vec3 origin = step_off(point, way.surface.normal, view, way.hit.distance);
-  way.brought += way.throughput / chance * light_in_gloss(gloss, way.surface, origin, view, blur, event);
-  way.throughput *= reflection.mirrored / chance;
+  return step_off(way.surface.position, way.surface.normal, -way.direction, way.hit.distance);
+}
+
+/* The ray goes on from its surface by `reflection`, out of a lobe of this width. */
+void go_on(inout Way way, Reflection reflection, float width, bool meets_lamps, float spread)
+{
+  vec3 point = way.surface.position, origin = beginning(way);
+  way.throughput *= reflection.mirrored;
   way.direction = reflection.direction;
   way.hit = trace_closest(origin, way.direction);
-  way.brought += way.throughput * lamps_met(point, way.direction, way.hit.distance);
+  if (meets_lamps) {
+    way.brought += way.throughput * lamps_met(point, way.direction, way.hit.distance, width);
+  }
   if (way.hit.triangle < 0) {
     ivec2 texel = direction_texel(way.direction);
     way.brought += way.throughput * element(world_texels, texel.y * FACE + texel.x).rgb;
@@ -30,10 +36,11 @@ void go_on(inout Way way, Gloss gloss, Reflection reflection, float chance, uvec
   }
   way.surface = resolve_surface(way.hit.triangle, way.hit.barycentric, origin, way.direction, spread);
   way.brought += way.throughput * way.surface.emission *
-                 emitter_share_of_rays(way.surface, way.hit.triangle, way.direction, way.hit.distance);
+                 emitter_share_of_rays(way.surface, way.hit.triangle, way.direction, way.hit.distance, width);
 }
 
-/* Follows the ray `number` of `key`, whose reflections count from `first` on, `most` of them; it sees lamps in lobes of at least `blur`. Where it ends, `surface.albedo` is what it finds sent diffusely. */
+/* Follows the ray `number` of `key`, whose reflections count from `first` on, `most` of them; it sees lamps in lobes of at least `blur`.
+ * Where it ends, `surface.albedo` is what it finds sent diffusely. */
 void follow_reflections(inout Way way, uvec3 key, int number, int first, int most, float blur, float spread)
 {
   for (int depth = first; depth < first + most && way.throughput != vec3(0.0); depth++) {
@@ -51,6 +58,9 @@ void follow_reflections(inout Way way, uvec3 key, int number, int first, int mos
       way.surface.albedo = reflection.diffuse / (1.0 - chance);
       return;
     }
-    go_on(way, gloss, reflection, chance, event, blur, spread);
+    way.throughput /= chance;
+    float width = max(gloss.alpha, blur);
+    way.brought += way.throughput * light_in_gloss(gloss, way.surface, beginning(way), -way.direction, width, event);
+    go_on(way, reflection, width, true, spread);
   }
 }

@@ -1,10 +1,58 @@
-/* What texels on glossy surfaces see mirrored: REFLECTIONS rays each, which go on until they end on something diffuse.
+/* What texels on glossy surfaces see mirrored: REFLECTIONS rays each, which go on until they end on something diffuse, and lamps.
  *
+ * Rays leave, and lamps are looked at, from places spread over what the texel shows: mirrored things are smaller than a texel.
  * Dispatch: x = columns, y = 6·FACE rows, z = probes; groups of 8×8×1. Texel of the dispatch: (probe · 6·FACE + row) · FACE + column.
  * Writes for each ray `hits` (position, packed normal; −1 where nothing more comes), `hit_sheets` and `reflected`, by which the light there
- * counts; for each texel `carried`, what its rays brought along; and into `albedo`, what glossy texels send back diffusely.
+ * counts; for each texel `carried`, what its rays brought along and lamps send; and into `albedo`, what glossy texels send back diffusely.
  * Reference: core/reference_gloss.py.
  */
+
+/* The ray through `place` (0..1) of a texel to the plane of what its `middle` has met; the middle itself where that slants too much. */
+Way way_through(vec2 place, Way middle, vec3 origin, ivec2 texel)
+{
+  Way way = middle;
+  vec3 geometric = triangle_normal(middle.hit.triangle, -middle.direction);
+  vec3 direction = texel_place_direction(texel, place);
+  float slope = dot(geometric, direction), distance = dot(geometric, middle.surface.position - origin) / slope;
+  if (slope > -0.01 || distance > 2.0 * middle.hit.distance) {
+    return way;
+  }
+  way.direction = direction;
+  way.hit.distance = distance;
+  way.surface.position = origin + distance * direction;
+  vec2 barycentric = barycentric_of(middle.hit.triangle, way.surface.position);
+  int first = 5 * middle.hit.triangle;
+  vec3 normal = normalize(interpolate(element(triangle_attributes, first).xyz, element(triangle_attributes, first + 1).xyz,
+                                      element(triangle_attributes, first + 2).xyz, barycentric));
+  way.surface.normal = middle.surface.back ? -normal : normal;
+  return way;
+}
+
+/* Least width of lobes in which the texel sees lamps: so wide that places in it do not miss one between them. */
+float blur_of(Way middle, vec3 origin, ivec2 texel)
+{
+  vec3 left = way_through(vec2(0.1, 0.5), middle, origin, texel).surface.normal;
+  vec3 right = way_through(vec2(0.9, 0.5), middle, origin, texel).surface.normal;
+  vec3 low = way_through(vec2(0.5, 0.1), middle, origin, texel).surface.normal;
+  vec3 high = way_through(vec2(0.5, 0.9), middle, origin, texel).surface.normal;
+  float bend = 1.25 * max(length(right - left), length(high - low));
+  return TEXEL_BLUR * (0.5 * 1.5707963267948966 / float(FACE) + bend);
+}
+
+/* Radiance of lamps that a ray which leaves `way` along `direction` meets. */
+vec3 lamps_mirrored(Way way, vec3 direction, float width)
+{
+  if (lamps_met(way.surface.position, direction, NO_HIT, width) == vec3(0.0)) {
+    return vec3(0.0);
+  }
+  float limit = trace_closest(beginning(way), direction).distance;
+  return lamps_met(way.surface.position, direction, limit, width);
+}
+
+bool is_hidden(Way way, vec3 origin)
+{
+  return trace_any(origin, way.direction, way.hit.distance * 0.999);
+}
 
 void main()
 {
@@ -23,26 +71,50 @@ void main()
   bool is_glossy = gloss.share != vec3(0.0);
   vec4 slot = element(probe_slots, first_slot + id.z);
   vec3 direction = texel_direction(id.xy);
-  Surface surface;
+  Way middle;
+  uvec3 key = uvec3(uint(slot.w), 0x165667B1u, uint(seed));
+  uvec3 place_key = key + uvec3(0u, 0x2C1B3C6Du, 0u), light_key = key + uvec3(0u, LIGHT_STREAM, 0u);
+  int number = id.y * FACE + id.x;
+  vec3 diffuse = vec3(0.0), brought = vec3(0.0);
+  float width = 0.0;
   if (is_glossy) {
     vec2 barycentric = barycentric_of(triangle, slot.xyz + direction * abs(seen.z));
-    surface = resolve_surface(triangle, barycentric, slot.xyz, direction, 2.0 / float(FACE));
+    Surface surface = resolve_surface(triangle, barycentric, slot.xyz, direction, 2.0 / float(FACE));
+    middle = Way(direction, Hit(abs(seen.z), triangle, barycentric), surface, vec3(1.0), vec3(0.0));
+    width = max(gloss.alpha, blur_of(middle, slot.xyz, id.xy));
+    for (int i = 0; i < LOOKS && light_count > 0; i++) {
+      int look = number * LOOKS + i;
+      Way way = way_through(sample_r3(place_key, look).xy, middle, slot.xyz, id.xy);
+      vec3 light = lamps_in_gloss(gloss, way.surface, beginning(way), -way.direction, width, light_key, look);
+      uvec3 event = reflection_event(light_key, look, 0);
+      Reflection reflection = reflect_at(gloss, way.surface, triangle, -way.direction, event, sample_r2(light_key, look));
+      light += reflection.mirrored * lamps_mirrored(way, reflection.direction, width);
+      if (light != vec3(0.0) && !is_hidden(way, slot.xyz)) {
+        brought += light / float(LOOKS);
+      }
+    }
   }
-  uvec3 key = uvec3(uint(slot.w), 0x165667B1u, uint(seed));
-  vec3 diffuse = vec3(0.0), brought = vec3(0.0);
   for (int ray = 0; ray < REFLECTIONS; ray++) {
     vec4 end = vec4(0.0, 0.0, 0.0, -1.0);
     vec3 sent = vec3(0.0);
     int sheet = 0;
     if (is_glossy) {
-      int number = (id.y * FACE + id.x) * REFLECTIONS + ray;
-      uvec3 event = reflection_event(key, number, 0);
-      Reflection reflection = reflect_at(gloss, surface, triangle, -direction, event, sample_r2(key, number));
+      int ray_number = number * REFLECTIONS + ray;
+      uvec3 event = reflection_event(key, ray_number, 0);
+      Way way = way_through(sample_r3(place_key + uvec3(0u, 0u, 1u), ray_number).xy, middle, slot.xyz, id.xy);
+      if (is_hidden(way, slot.xyz)) {
+        way = middle;
+      }
+      vec2 first = sample_r2(key, ray_number);
+      Reflection reflection = reflect_at(gloss, way.surface, triangle, -way.direction, event, first);
       diffuse += reflection.diffuse;
-      Way way = Way(direction, Hit(abs(seen.z), triangle, vec2(0.0)), surface, vec3(1.0), vec3(0.0));
-      go_on(way, gloss, reflection, 1.0, event, TEXEL_BLUR, 2.0 / float(FACE));
-      follow_reflections(way, key, number, 1, MOST_REFLECTIONS - 1, PATCH_BLUR, 2.0 / float(FACE));
-      brought += way.brought;
+#ifdef HAS_EMITTERS
+      uvec3 emitter_key = light_key + uvec3(0u, 0u, 0x2545F491u);
+      way.brought = emitters_in_gloss(gloss, way.surface, beginning(way), -way.direction, width, emitter_key, ray_number);
+#endif
+      go_on(way, reflection, width, false, 2.0 / float(FACE));
+      follow_reflections(way, key, ray_number, 1, MOST_REFLECTIONS - 1, PATCH_BLUR, 2.0 / float(FACE));
+      brought += way.brought / float(REFLECTIONS);
       sent = way.throughput == vec3(0.0) ? vec3(0.0) : way.throughput * way.surface.albedo;
       if (sent != vec3(0.0)) {
 #ifdef HAS_SHEETS
@@ -59,7 +131,7 @@ void main()
     imageStore(hit_sheets, place, vec4(float(sheet)));
 #endif
   }
-  imageStore(carried, element_position(texel), vec4(brought / float(REFLECTIONS), 0.0));
+  imageStore(carried, element_position(texel), vec4(brought, 0.0));
   if (is_glossy) {
     imageStore(albedo, at, vec4(diffuse / float(REFLECTIONS), imageLoad(albedo, at).w));
   }
