@@ -11,9 +11,10 @@ from ..core.conventions import LUMINANCE
 from ..core.gloss import Gloss
 from .shader_values import Value, add, constant
 
-# Of the light, times 1 − roughness: lobes with less stay diffuse, as mirrored or not makes no difference to probes that
-# would be worth rays (docs/measurements.md, Gloss).
-LEAST_GLOSS = 0.05
+# Of the light, times 1 − roughness, times the root of its share of all that is sent back. Below, a lobe is sent in all
+# directions like the rest: the gloss of a Principled BSDF as Blender adds it, unless it is nearly black, is not worth a
+# bake of four times the work for 1 % of light (docs/measurements.md, Gloss and mirrors).
+LEAST_GLOSS = 0.02
 
 
 @dataclass(frozen=True)
@@ -24,32 +25,21 @@ class Mirrored:
     facing: np.ndarray
     roughness: float
 
-    @property
-    def matters(self) -> bool:
-        return self.color.number() * (1 - self.roughness) >= LEAST_GLOSS
-
     def of(self, color: Value) -> Mirrored:
         """The same facets with another ``color``."""
         return replace(self, color=color)
 
     def gloss(self, sent_back: Value) -> Gloss | None:
-        """It as a part of all that is ``sent_back``; None where it does not matter."""
-        if not self.matters:
+        """It as a part of all that is ``sent_back``; None where that makes too little of a difference."""
+        light, all_ = self.color.number(), max(sent_back.number(), 1e-9)
+        if light * (1 - self.roughness) * (light / all_) ** 0.5 < LEAST_GLOSS:
             return None
         fixed = self.color.is_constant
         share = self.color.rgb() if fixed else self.color.rgb() / np.maximum(sent_back.rgb(), 1e-9)
-        red, green, blue = np.clip(share, 0.0, 1.0).tolist()
-        first, second, third = np.clip(self.facing, 0.0, 1.0).tolist()
-        return Gloss((red, green, blue), (first, second, third), float(np.clip(self.roughness, 0.0, 1.0)), fixed)
+        return Gloss(_colour(share), _colour(self.facing), float(np.clip(self.roughness, 0.0, 1.0)), fixed)
 
 
 NOTHING_MIRRORED = Mirrored(constant([0.0, 0.0, 0.0]), np.ones(3), 0.0)
-
-
-def mirrored_by(color: Value, facing: np.ndarray, roughness: float) -> Mirrored:
-    """A lobe of mean albedo ``color``; nothing where it does not matter."""
-    lobe = Mirrored(color, np.asarray(facing, float), roughness)
-    return lobe if lobe.matters else NOTHING_MIRRORED
 
 
 def joined(first: Mirrored, second: Mirrored) -> Mirrored:
@@ -63,3 +53,8 @@ def joined(first: Mirrored, second: Mirrored) -> Mirrored:
         first.facing + share * (second.facing - first.facing),
         first.roughness + share * (second.roughness - first.roughness),
     )
+
+
+def _colour(values: np.ndarray) -> tuple[float, float, float]:
+    red, green, blue = np.clip(values, 0.0, 1.0).tolist()
+    return red, green, blue

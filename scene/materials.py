@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
+from ..core.gloss import Gloss
 from ..core.snapshot import DIFFUSE_RAYS, DITHERED, FROM_BEHIND, NO_IMAGE, Material
 from .images import ImageTable
 from .node_links import Unsupported, active_output, find_socket
@@ -164,7 +165,7 @@ class MaterialTable:
                 alpha=opacity.number() if opacity.is_constant else 1.0,
                 alpha_threshold=0.0 if opacity.is_constant and opacity.number() > 1 - _LEAST_OPACITY else DITHERED,
                 transmitted=transmitted,
-                gloss=closure.mirrored.gloss(sent_back) if not any(transmitted) else None,
+                gloss=self._gloss(name, closure, sent_back, any(transmitted)),
                 unseen_by=FROM_BEHIND if closure.one_sided else 0,
                 backface_culling=backface_culling,
             )
@@ -184,6 +185,13 @@ class MaterialTable:
         whole = add(closure.diffuse, closure.through)
         mean = np.maximum(np.broadcast_to(whole.mean(), 3), 1e-9)
         return whole, _three(np.clip(np.broadcast_to(closure.through.mean(), 3) / mean, 0.0, 1.0))
+
+    def _gloss(self, name: str, closure: Closure, sent_back: Value, lets_through: bool) -> Gloss | None:
+        gloss = closure.mirrored.gloss(sent_back)
+        if gloss is not None and lets_through:
+            self._notices.group("gloss of translucent materials is sent in all directions", name)
+            return None
+        return gloss
 
     def _in_domain(self, name: str, role: str, value: Value, domain: Domain) -> Value:
         """``value`` as it can be sampled with the material's one mapping: textures that lie elsewhere become their

@@ -30,7 +30,7 @@ from .albedos import (
     sheen_albedo,
     tinted_coat,
 )
-from .gloss_lobes import NOTHING_MIRRORED, Mirrored, joined, mirrored_by
+from .gloss_lobes import NOTHING_MIRRORED, Mirrored, joined
 from .node_links import Scope, Unsupported, find_socket, resolve
 from .shader_nodes import NodeEvaluator
 from .shader_values import ONE, ZERO, Value, add, apply, blend, complement, constant, multiply
@@ -98,12 +98,12 @@ def _principled(evaluator, node, scope):
         value("Specular Tint").rgb() * facing_reflectance(ior, level),
     )
     albedo = layered(specular, share, albedo)
-    mirrored = mirrored_by(specular, facing, roughness)
+    mirrored = Mirrored(specular, facing, roughness)
     if not metallic.is_zero():
         metal = metal_albedo(value("Base Color"), roughness)
         albedo = blend(metallic, albedo, metal)
         facing = facing + (value("Base Color").rgb() - facing) * metallic.number()
-        mirrored = mirrored_by(blend(metallic, specular, metal), facing, roughness)
+        mirrored = Mirrored(blend(metallic, specular, metal), facing, roughness)
     opacity = _unit(value("Alpha"))
     if not through.is_zero():
         evaluator.notices.group("glass lets light through unbent and uncoloured", evaluator.owner_name)
@@ -115,7 +115,7 @@ def _principled(evaluator, node, scope):
         albedo = layered(constant(share), share, tinted_coat(albedo, coat, value("Coat Tint")))
         below = tinted_coat(mirrored.color, coat, value("Coat Tint")).scaled(1 - share)
         mirrored = joined(
-            mirrored.of(below), mirrored_by(constant([share] * 3), np.full(3, facing_reflectance(ior)), roughness)
+            mirrored.of(below), Mirrored(constant([share] * 3), np.full(3, facing_reflectance(ior)), roughness)
         )
     sheen = _unit(value("Sheen Weight"))
     if not sheen.is_zero():
@@ -151,10 +151,10 @@ def _glossy(evaluator, node, scope):
             evaluator.notices.group("physical conductors reflect a mean grey", evaluator.owner_name)
             color = constant([0.57, 0.53, 0.5])
         albedo = metal_albedo(color, roughness)
-        return Closure(albedo, mirrored=mirrored_by(albedo, color.rgb(), roughness))
+        return Closure(albedo, mirrored=Mirrored(albedo, color.rgb(), roughness))
     color = evaluator.input(node, "Color", scope)
     albedo = glossy_albedo(color, roughness, getattr(node, "distribution", "") == "MULTI_GGX")
-    return Closure(albedo, mirrored=mirrored_by(albedo, np.ones(3), roughness))
+    return Closure(albedo, mirrored=Mirrored(albedo, np.ones(3), roughness))
 
 
 def _sheen(evaluator, node, scope):

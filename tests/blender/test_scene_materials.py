@@ -38,12 +38,52 @@ def test_material_without_nodes(scene):
     assert read(scene, made)[0].base_color == pytest.approx((0.3, 0.2, 0.1))
 
 
-def test_metal_reflects_its_colour_and_says_so(scene):
-    read_material, snapshot = read(
+def test_metal_mirrors_its_colour(scene):
+    read_material, _ = read(
         scene, material("Steel", "ShaderNodeBsdfPrincipled", {"Base Color": (1, 0.5, 0.5, 1), "Metallic": 1.0})
     )
     assert read_material.base_color == pytest.approx((1, 0.48, 0.48), abs=0.01)
-    assert warned(snapshot, "metal", "'Steel'")
+    gloss = read_material.gloss
+    assert gloss.share == pytest.approx(read_material.base_color) and gloss.fixed
+    assert gloss.facing == pytest.approx((1, 0.5, 0.5)) and gloss.roughness == pytest.approx(0.5)
+
+
+def test_metal_of_an_image_mirrors_it(scene):
+    def shader(tree):
+        inputs = {"Base Color": textured(tree), "Metallic": 1.0, "Roughness": 0.2}
+        return node(tree, "ShaderNodeBsdfPrincipled", inputs).outputs[0]
+
+    read_material, _ = read(scene, built(shader))
+    assert read_material.base_image >= 0
+    assert read_material.gloss.share == pytest.approx((1, 1, 1)) and not read_material.gloss.fixed
+
+
+@pytest.mark.parametrize(
+    ("inputs", "share", "facing", "roughness"),
+    [
+        ({}, None, None, None),  # a Principled BSDF as Blender adds it
+        ({"Base Color": (0.03, 0.03, 0.03, 1)}, 0.058, 0.04, 0.5),
+        ({"Coat Weight": 1.0, "Coat Roughness": 0.05, "Specular IOR Level": 0.0}, 0.088, 0.04, 0.05),
+    ],
+)
+def test_gloss_that_matters(scene, inputs, share, facing, roughness):
+    gloss = read(scene, material("plastic", "ShaderNodeBsdfPrincipled", inputs))[0].gloss
+    if share is None:
+        assert gloss is None
+        return
+    assert gloss.share == pytest.approx((share,) * 3, abs=0.003) and gloss.facing == pytest.approx((facing,) * 3)
+    assert gloss.roughness == pytest.approx(roughness) and gloss.fixed
+
+
+def test_mixed_gloss_is_as_much_as_there_is_of_it(scene):
+    def shader(tree):
+        matte = node(tree, "ShaderNodeBsdfDiffuse", {"Color": (0.2, 0.4, 0.6, 1)}).outputs[0]
+        glossy = node(tree, "ShaderNodeBsdfAnisotropic", {"Color": (0.8, 0.8, 0.8, 1), "Roughness": 0.1}).outputs[0]
+        return node(tree, "ShaderNodeMixShader", {"Fac": 0.25, "Shader": matte, "Shader_001": glossy}).outputs[0]
+
+    read_material, _ = read(scene, built(shader))
+    assert read_material.gloss.share == pytest.approx((0.2,) * 3, abs=0.005)
+    assert read_material.base_color == pytest.approx((0.35, 0.5, 0.65), abs=0.005)
 
 
 def test_emission_is_colour_times_strength(scene):
@@ -103,13 +143,12 @@ def test_mix_and_add_shaders(scene):
     assert read_material.emission == pytest.approx((0.5, 0.5, 0.5))
 
 
-def test_glossy_keeps_its_energy_and_says_so(scene):
-    read_material, snapshot = read(
+def test_glossy_keeps_its_energy(scene):
+    read_material, _ = read(
         scene, material("Chrome", "ShaderNodeBsdfAnisotropic", {"Color": (0.9, 0.8, 0.7, 1), "Roughness": 0.1})
     )
-    assert read_material.base_color == pytest.approx((0.9, 0.8, 0.7), abs=0.01) and warned(
-        snapshot, "glossy", "'Chrome'"
-    )
+    assert read_material.base_color == pytest.approx((0.9, 0.8, 0.7), abs=0.01)
+    assert read_material.gloss.facing == (1, 1, 1) and read_material.gloss.roughness == pytest.approx(0.1)
 
 
 def test_two_outputs_the_one_for_cycles_counts(scene):
@@ -273,6 +312,6 @@ def test_warnings_are_one_line_for_many(scene):
     data = quad(uv_map="UVMap")
     place(data)
     for index in range(20):
-        data.materials.append(material(f"metal {index}", "ShaderNodeBsdfPrincipled", {"Metallic": 1.0}))
+        data.materials.append(material(f"glass {index}", "ShaderNodeBsdfPrincipled", {"Transmission Weight": 0.5}))
     lines = read_scene(scene).warnings
     assert len(lines) == 1 and "and 14 more" in lines[0]
