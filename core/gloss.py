@@ -33,7 +33,8 @@ from .sampling import pcg3d, tangent_frame
 
 MOST_REFLECTIONS = 8  # of a ray in a row; what the last one meets reflects in all directions
 TEXEL_RAYS = 4  # of a texel on a glossy surface
-TEXEL_LOOKS = 64  # at lamps, of the same
+TEXEL_LOOKS, LEAST_LOOKS = 64, 4  # at lamps, of the same, and
+LOOKS_IN_ALL = 1024  # at each of them together where there are many
 PATCH_BLUR = 0.2  # least width α of lobes in which patches see lamps
 # And probes: against how far facets that mirror one way turn from one side of a texel to the other, radians.
 TEXEL_BLUR = 0.4
@@ -194,6 +195,11 @@ def mean_grazing(alpha: np.ndarray) -> np.ndarray:
     """(N,) mean of (1 − cos θ)⁵ over facets seen from everywhere: 1/21 where they lie flat, less where they turn to the
     view. A fit to what ``GlossyPlaces.reflect`` draws, good to a tenth."""
     return 1 / (21 + 204 * alpha**1.55)
+
+
+def looks_at(lamps: int) -> int:
+    """Looks of a texel at each of so many ``lamps``."""
+    return min(max(LOOKS_IN_ALL // lamps, LEAST_LOOKS), TEXEL_LOOKS) if lamps else 0
 
 
 def share_of_points(extent: np.ndarray, width: np.ndarray) -> np.ndarray:

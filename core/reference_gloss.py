@@ -19,7 +19,6 @@ from .gloss import (
     MOST_REFLECTIONS,
     PATCH_BLUR,
     TEXEL_BLUR,
-    TEXEL_LOOKS,
     TEXEL_RAYS,
     GlossyPlaces,
     Reflections,
@@ -27,6 +26,7 @@ from .gloss import (
     events_of,
     gloss_rows,
     light_keys_of,
+    looks_at,
     share_of_points,
     unit_numbers,
 )
@@ -247,11 +247,13 @@ class ReferenceGloss:
         middle = _Middle(seen, self.places(seen), origin, glossy % texels, face, self.scene)
         width = np.maximum(middle.places.alpha, middle.blur())
         keys = keys_of(nodes[glossy // texels], _TEXEL_STREAM, seed)
-        looked = sum(self._look(middle, width, keys, (glossy % texels) * TEXEL_LOOKS + i) for i in range(TEXEL_LOOKS))
+        looks, looked = looks_at(len(self._lamps())), np.zeros((len(glossy), 3))
+        for look in range(looks):
+            looked += self._look(middle, width, keys, (glossy % texels) * looks + look) / looks
         ray = np.tile(np.arange(TEXEL_RAYS), len(glossy))
         each = np.repeat(np.arange(len(glossy)), TEXEL_RAYS)
         diffuse, ways = self._send(middle.at(each), width[each], keys[each], (glossy[each] % texels) * TEXEL_RAYS + ray)
-        return glossy[each], diffuse, ways, glossy, looked / TEXEL_LOOKS
+        return glossy[each], diffuse, ways, glossy, looked
 
     def _look(self, middle: _Middle, width: np.ndarray, keys: np.ndarray, numbers: np.ndarray) -> np.ndarray:
         """(G, 3) radiance that lamps send to texels by one place in each."""

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 from ..core.gloss import (
     ATTEMPTS,
+    LEAST_LOOKS,
     LIGHT_STREAM,
+    LOOKS_IN_ALL,
     MOST_REFLECTIONS,
     PATCH_BLUR,
     REFLECTION_STREAM,
@@ -42,7 +44,8 @@ def gloss_files(defines: dict, rays: bool = True) -> list[str]:
 def texel_reflections_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
     info.define("REFLECTIONS", str(TEXEL_RAYS))
-    info.define("LOOKS", str(TEXEL_LOOKS))
+    for name, value in (("LOOKS", TEXEL_LOOKS), ("LEAST_LOOKS", LEAST_LOOKS), ("LOOKS_IN_ALL", LOOKS_IN_ALL)):
+        info.define(name, str(value))
     slot = gloss(info, defines, _emitters(info, defines, _scene(info, defines)))
     slot = _samplers(info, "lights", "probe_slots", "world_texels", first=slot)
     slot = _sheets(info, defines, slot)

@@ -80,17 +80,25 @@ void main()
   if (is_glossy) {
     vec2 barycentric = barycentric_of(triangle, slot.xyz + direction * abs(seen.z));
     Surface surface = resolve_surface(triangle, barycentric, slot.xyz, direction, 2.0 / float(FACE));
+    vec2 inside = max(barycentric, vec2(0.0)); /* rasterised triangles reach over their edges, see texel_hits_comp */
+    inside /= max(inside.x + inside.y, 1.0);
+    if (inside != barycentric) {
+      barycentric = inside;
+      surface.position = interpolate(element(triangle_corners, 3 * triangle).xyz, element(triangle_corners, 3 * triangle + 1).xyz,
+                                     element(triangle_corners, 3 * triangle + 2).xyz, inside);
+    }
     middle = Way(direction, Hit(abs(seen.z), triangle, barycentric), surface, vec3(1.0), vec3(0.0));
     width = max(gloss.alpha, blur_of(middle, slot.xyz, id.xy));
-    for (int i = 0; i < LOOKS && light_count > 0; i++) {
-      int look = number * LOOKS + i;
+    int looks = light_count > 0 ? clamp(LOOKS_IN_ALL / light_count, LEAST_LOOKS, LOOKS) : 0;
+    for (int i = 0; i < looks; i++) {
+      int look = number * looks + i;
       Way way = way_through(sample_r3(place_key, look).xy, middle, slot.xyz, id.xy);
       vec3 light = lamps_in_gloss(gloss, way.surface, beginning(way), -way.direction, width, light_key, look);
       uvec3 event = reflection_event(light_key, look, 0);
       Reflection reflection = reflect_at(gloss, way.surface, triangle, -way.direction, event, sample_r2(light_key, look));
       light += reflection.mirrored * lamps_mirrored(way, reflection.direction, width);
       if (light != vec3(0.0) && !is_hidden(way, slot.xyz)) {
-        brought += light / float(LOOKS);
+        brought += light / float(looks);
       }
     }
   }
