@@ -10,6 +10,8 @@ from ..gpu_shaders.backend import GpuBackend, Surfaces
 from ..gpu_shaders.change_pass import move_layers
 from .stopwatch import Stopwatch
 
+_REFLECT_AT_ONCE = 256  # probes, whose rays take 100 MiB with faces of 16
+
 
 class Batches:
     """Slots 0 .. S−1 of the backend in order, cut into batches. ``captures`` counts probes captured so far."""
@@ -65,11 +67,9 @@ class Batches:
         is captured again."""
         for index in sorted(self._bound):
             surfaces = self._kept[index]
-
-            def reflect(first: int, number: int, surfaces=surfaces) -> None:
-                self._backend.reflect(surfaces, first, number)
-
-            yield from self.stopwatch.steps("light", self.pace.portions("reflect", surfaces.count, reflect, 1, 64))
+            for first in range(0, surfaces.count, _REFLECT_AT_ONCE):
+                number = min(_REFLECT_AT_ONCE, surfaces.count - first)
+                yield from self.stopwatch.steps("light", self._backend.reflect(surfaces, first, number))
 
     def capture_again(self, slots: np.ndarray) -> Steps[None]:
         """Captures probes ``slots`` (L,), ascending, anew, in steps: they moved or see something else."""

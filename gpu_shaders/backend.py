@@ -268,13 +268,13 @@ class GpuBackend:
         stop = surfaces.first + surfaces.count if count is None else first + count
         while first < stop:
             end = min(stop, (first // self._portion + 1) * self._portion)
+            yield from self.reflect(surfaces, first - surfaces.first, end - first)
             self._bind_portion(surfaces, first - surfaces.first, end - first)
             first = end
             yield
 
     def _bind_portion(self, surfaces: Surfaces, start: int, count: int) -> None:
         first = surfaces.first + start
-        self.reflect(surfaces, start, count)
         texels = self._texel_hits(surfaces, start, count)
         patches = self.light.patches.bind_texels(texels, self.face, self.probe_slots, first, count)
         shader = program("texel_patches_comp", FACE=self.face)
@@ -283,10 +283,10 @@ class GpuBackend:
         shader.uniform_int("first_layer", (start,))
         self._dispatch_texels(shader, count)
 
-    def reflect(self, surfaces: Surfaces, start: int, count: int) -> None:
-        """Finds what glossy texels of ``count`` probes from ``start`` mirror."""
-        where = (start, count, surfaces.count), self.probe_slots, surfaces.first + start
-        self.gloss.reflect(surfaces.textures, *where, self.settings.seed, self.world_texels, self.light.patches)
+    def reflect(self, surfaces: Surfaces, start: int, count: int) -> Steps[None]:
+        """Finds what glossy texels of ``count`` probes from ``start`` mirror, in steps."""
+        where = (start, count, surfaces.count), self.probe_slots, surfaces.first + start, self.world_texels
+        yield from self.gloss.reflect(surfaces.textures, *where, self.light.patches, self.settings.seed, self._pace)
 
     def _texel_hits(self, surfaces: Surfaces, start: int, count: int) -> Places:
         """Where texels meet surface, as one linear array."""

@@ -55,7 +55,7 @@ def texel_reflections_comp(info, defines):
     _image(info, 3, "albedo", layered=True, access="READ+WRITE")
     if "HAS_SHEETS" in defines:
         _image(info, 4, "hit_sheets", pixel="R32F")
-    _ints(info, "first_slot", "first_layer", "light_count", "seed")
+    _ints(info, "first_slot", "first_layer", "first_probe", "light_count", "seed")
     info.local_group_size(8, 8, 1)
     files = [*_light_files(defines | {"HAS_ALPHA": True}), *gloss_files(defines), *_sheet_files(defines)]
     return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *files, "texel_reflections_comp"]}

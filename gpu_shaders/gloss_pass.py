@@ -11,6 +11,7 @@ from __future__ import annotations
 import gpu
 
 from ..core.gloss import TEXEL_RAYS
+from ..core.steps import Pace, Steps
 from .dispatch import dispatch_linear
 from .patch_finder import PatchFinder
 from .places import Places
@@ -50,44 +51,67 @@ class GlossPass:
         layers: tuple[int, int, int],
         probe_slots: gpu.types.GPUTexture,
         first_slot: int,
-        seed: int,
         world_texels: gpu.types.GPUTexture,
         patches: PatchFinder,
-    ) -> None:
+        seed: int,
+        pace: Pace,
+    ) -> Steps[None]:
         """Finds what glossy texels of some ``layers`` (first, count, number of all) of the surfaces ``textures``
-        mirror, and what they send back diffusely. Where rays end, ``patches`` are found. The slot of the first of these
-        layers is ``first_slot``."""
-        scene, face, (first, count, layer_count) = self._scene, self._face, layers
-        if not scene.has_gloss:
+        mirror, and what they send back diffusely, in steps. Where rays end, ``patches`` are found. The slot of the
+        first of these layers is ``first_slot``."""
+        if not self._scene.has_gloss:
             return
-        texels = count * 6 * face**2
-        rays = texels * TEXEL_RAYS
-        hits, reflected, carried = scratch(rays, "rays"), scratch(rays, "rays"), scratch(texels, "texels")
-        sheets = scratch(rays, "rays", "R32F") if scene.has_sheets else None
-        defines = scene.surface_defines | scene.light_defines | scene.sheet_defines | scene.gloss_defines
-        shader = program("texel_reflections_comp", FACE=face, **(defines | {"HAS_IMAGES": scene.has_images}))
-        scene.bind_surfaces(shader)
-        scene.bind_sheets(shader)
-        scene.bind_gloss(shader, lights=True)
-        shader.uniform_sampler("probe_slots", probe_slots)
-        shader.uniform_sampler("world_texels", world_texels)
-        shader.uniform_sampler("geometry", textures["geometry"])
-        shader.image("albedo", textures["albedo"])
-        for name, texture in (("hits", hits), ("reflected", reflected), ("carried", carried)):
-            shader.image(name, texture)
-        if sheets is not None:
-            shader.image("hit_sheets", sheets)
-        for name, value in (("first_slot", first_slot), ("first_layer", first), ("seed", seed)):
-            shader.uniform_int(name, (value,))
-        gpu.compute.dispatch(shader, -(-face // 8), -(-6 * face // 8), count)
-        ends = patches.bind_ends(Places(hits, 1, sheets), rays, 0)
+        first, count, layer_count = layers
+        texels_each = 6 * self._face**2
+        found = _Found(count * texels_each, self._scene.has_sheets)
+
+        def trace(start: int, number: int) -> None:
+            shader = self._tracer(textures, found)
+            shader.uniform_sampler("probe_slots", probe_slots)
+            shader.uniform_sampler("world_texels", world_texels)
+            where = ("first_slot", first_slot), ("first_layer", first), ("first_probe", start), ("seed", seed)
+            for name, value in where:
+                shader.uniform_int(name, (value,))
+            gpu.compute.dispatch(shader, -(-self._face // 8), -(-6 * self._face // 8), number)
+
+        yield from pace.portions("reflect", count, trace, first=2)
+        ends = patches.bind_ends(Places(found.hits, 1, found.sheets), count * texels_each * TEXEL_RAYS, 0)
         if "mirrored" not in textures:
-            textures["mirrored"] = allocate(layer_count * 6 * face**2 * (TEXEL_RAYS + 1), "texels")
+            textures["mirrored"] = allocate(layer_count * texels_each * (TEXEL_RAYS + 1), "texels")
         shader = program("texel_mirrored_comp", REFLECTIONS=TEXEL_RAYS)
-        for name, texture in (("ends", ends), ("reflected", reflected), ("carried", carried)):
+        for name, texture in (("ends", ends), ("reflected", found.reflected), ("carried", found.carried)):
             shader.uniform_sampler(name, texture)
         shader.image("mirrored", textures["mirrored"])
         shader.image("seen", patches.seen)
-        shader.uniform_int("first_texel", (first * 6 * face**2,))
-        shader.uniform_int("texel_count", (texels,))
-        dispatch_linear(shader, texels)
+        shader.uniform_int("first_texel", (first * texels_each,))
+        shader.uniform_int("texel_count", (count * texels_each,))
+        dispatch_linear(shader, count * texels_each)
+
+    def _tracer(self, textures: dict, found: _Found):
+        scene = self._scene
+        defines = scene.surface_defines | scene.light_defines | scene.sheet_defines | scene.gloss_defines
+        defines |= {"HAS_IMAGES": scene.has_images}
+        shader = program("texel_reflections_comp", FACE=self._face, **defines)
+        scene.bind_surfaces(shader)
+        scene.bind_sheets(shader)
+        scene.bind_gloss(shader, lights=True)
+        shader.uniform_sampler("geometry", textures["geometry"])
+        shader.image("albedo", textures["albedo"])
+        for name in ("hits", "reflected", "carried"):
+            shader.image(name, getattr(found, name))
+        if found.sheets is not None:
+            shader.image("hit_sheets", found.sheets)
+        return shader
+
+
+class _Found:
+    """What rays of texels found, see texel_reflections_comp.glsl."""
+
+    def __init__(self, texels: int, has_sheets: bool):
+        rays = texels * TEXEL_RAYS
+        self.hits, self.reflected, self.carried = (
+            scratch(rays, "rays"),
+            scratch(rays, "rays"),
+            scratch(texels, "texels"),
+        )
+        self.sheets = scratch(rays, "rays", "R32F") if has_sheets else None

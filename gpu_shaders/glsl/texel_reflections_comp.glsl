@@ -1,7 +1,7 @@
 /* What texels on glossy surfaces see mirrored: REFLECTIONS rays each, which go on until they end on something diffuse, and lamps.
  *
  * Rays leave, and lamps are looked at, from places spread over what the texel shows: mirrored things are smaller than a texel.
- * Dispatch: x = columns, y = 6·FACE rows, z = probes; groups of 8×8×1. Texel of the dispatch: (probe · 6·FACE + row) · FACE + column.
+ * Dispatch: x = columns, y = 6·FACE rows, z = probes from first_probe on; groups of 8×8×1. Texel: (probe · 6·FACE + row) · FACE + column.
  * Writes for each ray `hits` (position, packed normal; −1 where nothing more comes), `hit_sheets` and `reflected`, by which the light there
  * counts; for each texel `carried`, what its rays brought along and lamps send; and into `albedo`, what glossy texels send back diffusely.
  * Reference: core/reference_gloss.py.
@@ -56,7 +56,7 @@ bool is_hidden(Way way, vec3 origin)
 
 void main()
 {
-  ivec3 id = ivec3(gl_GlobalInvocationID);
+  ivec3 id = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, first_probe);
   if (id.x >= FACE || id.y >= 6 * FACE) {
     return;
   }

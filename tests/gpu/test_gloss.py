@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from gridlight.core.emitters import sampling_density
 from gridlight.core.gloss import TEXEL_RAYS, Gloss
 from gridlight.core.grid import Grid
 from gridlight.core.patches import NO_PATCH
@@ -94,6 +95,12 @@ def test_mirror_shows_the_room_again(light, lamp):
     error = np.sqrt(((here - there) ** 2).sum() / (there**2).sum())
     bias = here[:, 0].mean() / there[:, 0].mean() - 1
     assert error < 0.07 and abs(bias) < 0.015
+    snapshot = room_beside_mirror(light, True, lamp)
+    scene = SceneTextures(snapshot, grid.center, sampling_density(snapshot, grid))
+    flux = ProbePaths(scene, snapshot, grid, grid.positions()).trace(0, 64, None, 1)[1]
+    assert flux.mean(axis=(0, 1)).sum(axis=0).mean() / 64 / np.sqrt(4 * np.pi) == pytest.approx(
+        here[:, 0].mean(), rel=0.03
+    )
 
 
 # Stages
