@@ -34,11 +34,11 @@ from .orientation import ShellVote, inside_solid
 from .patches import NO_PATCH, gather_rays
 from .reference_gloss import TexelReflections, texel_reflections
 from .reference_light import ReferenceLight
-from .reference_places import off_surface
 from .reference_scene import ReferenceScene, Surfaces
 from .sampling import keys_of, sample_r2
 from .settings import BakeSettings
-from .snapshot import SceneSnapshot
+from .sheets import off_surface
+from .snapshot import DIFFUSE_RAYS, SceneSnapshot
 from .world_map import world_texels
 from .world_suns import PROBE_RAYS, extract_suns
 
@@ -78,6 +78,9 @@ class ReferenceBake:
         missed = hits.triangle < 0
         background = world_texels(extract_suns(self.snapshot.world)[0], self.settings.face).reshape(-1, 3)
         flat.emission[missed] = np.tile(background, (shape[0], 1))[missed]
+        tint = self.scene.tint(origins, directions, np.where(missed, np.inf, hits.distance), DIFFUSE_RAYS)
+        flat.albedo *= tint
+        flat.emission *= tint
         return Surfaces(*(value.reshape(*shape, *value.shape[1:]) for value in vars(flat).values()))
 
     def points(self, surfaces: Surfaces) -> np.ndarray:
@@ -91,9 +94,9 @@ class ReferenceBake:
         reflects = (surfaces.triangle >= 0) & surfaces.albedo.any(axis=2)
         hits[..., 3] = -1.0
         directions = np.broadcast_to(self.directions, self.points(surfaces).shape)[reflects]
-        sheets = self.texel_sheets(surfaces)[reflects]
+        both_sides = self.scene.sheet_shares[self.texel_sheets(surfaces)[reflects]].any(axis=1)
         hits[reflects, :3] = off_surface(
-            self.points(surfaces)[reflects], directions, surfaces.distance[reflects], sheets
+            self.points(surfaces)[reflects], directions, surfaces.distance[reflects], both_sides
         )
         hits[reflects, 3] = pack_normal(octahedral_encode(surfaces.normal[reflects]))
         return hits
@@ -215,7 +218,8 @@ class ReferenceBake:
             keys = np.repeat(keys_of(self.nodes, _SUN_STREAM + number, self.settings.seed), PROBE_RAYS, axis=0)
             sample = sample_light(sun, origins, sample_r2(keys, np.tile(index, count)).astype(float))
             seen = self.scene.visible(origins, sample.directions, sample.distances)
-            flux = (sample.irradiance * seen[:, None] / PROBE_RAYS).reshape(count, PROBE_RAYS, 3)
+            tint = self.scene.tint(origins, sample.directions, sample.distances)
+            flux = (sample.irradiance * tint * seen[:, None] / PROBE_RAYS).reshape(count, PROBE_RAYS, 3)
             basis = sh.basis(sample.directions, self.settings.bands).reshape(count, PROBE_RAYS, -1)
             result += np.einsum("prk,prc->pkc", basis, flux)
         return result

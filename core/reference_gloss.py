@@ -8,17 +8,16 @@ Positions relative to the volume's centre; N rays.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from . import direct_light, rays
-from .cubemap import place_directions, texel_directions
+from .cubemap import texel_directions
 from .emitters import CANDIDATES
 from .gloss import (
     MOST_REFLECTIONS,
     PATCH_BLUR,
-    TEXEL_BLUR,
     TEXEL_RAYS,
     GlossyPlaces,
     Reflections,
@@ -30,41 +29,17 @@ from .gloss import (
     share_of_points,
     unit_numbers,
 )
-from .rays import step_off
 from .reference_emitters import ReferenceEmitters
-from .reference_scene import ReferenceScene, Surfaces, interpolate
+from .reference_places import pack
+from .reference_scene import ReferenceScene, Surfaces
+from .reference_ways import Middle, Ways, beginning
 from .sampling import keys_of, light_keys, sample_r2, sample_r3, shifted
-from .snapshot import Light
+from .sheets import off_surface
+from .snapshot import DIFFUSE_RAYS, Light
 
 _TEXEL_STREAM, _EMITTER_STREAM, _CHOICE_STREAM = 0x165667B1, 0x2545F491, 0x68E31DA4
 _PLACE_STREAM = 0x2C1B3C6D
-_SHADOW_END, _SIGHT_END = 0.9999, 0.999  # of the distance to a light, and to a place in a texel
-
-
-@dataclass
-class Ways:
-    """Rays that have met ``surface``: its ``position``, what part of what it sends counts, what was brought along."""
-
-    direction: np.ndarray  # (N, 3)
-    surface: Surfaces  # (N)
-    position: np.ndarray  # (N, 3)
-    throughput: np.ndarray  # (N, 3), 0 where nothing more can come
-    brought: np.ndarray  # (N, 3)
-
-    def at(self, chosen: np.ndarray) -> Ways:
-        return Ways(
-            self.direction[chosen],
-            Surfaces(*(value[chosen] for value in vars(self.surface).values())),
-            self.position[chosen],
-            self.throughput[chosen],
-            self.brought[chosen],
-        )
-
-    def put(self, chosen: np.ndarray, ways: Ways) -> None:
-        for field in fields(Surfaces):
-            getattr(self.surface, field.name)[chosen] = getattr(ways.surface, field.name)
-        for name in ("direction", "position", "throughput", "brought"):
-            getattr(self, name)[chosen] = getattr(ways, name)
+_SHADOW_END = 0.9999  # of the distance to a light
 
 
 @dataclass
@@ -75,6 +50,16 @@ class TexelReflections:
     carried: np.ndarray  # (P, X, 3) radiance that rays brought along
     ways: Ways  # (P·X·K)
     sent: np.ndarray  # (P·X·K, 3) by which part of the irradiance where they end they count
+
+    def ends(self, scene: ReferenceScene) -> tuple[np.ndarray, np.ndarray]:
+        """Places (P·X·K, 4) where rays end, and the sheets (P·X·K,) there."""
+        lit = self.sent.any(axis=1)
+        hits, sheets = np.zeros((len(lit), 4), np.float32), np.where(lit, scene.sheet[self.ways.surface.triangle], 0)
+        distance, both_sides = np.where(lit, self.ways.surface.distance, 0.0), scene.sheet_shares[sheets].any(axis=1)
+        hits[:, :3] = off_surface(self.ways.position, self.ways.direction, distance, both_sides)
+        hits[:, 3] = pack(self.ways.surface.normal, lit)
+        hits[~lit, :3] = 0.0
+        return hits, sheets
 
 
 class ReferenceGloss:
@@ -145,12 +130,15 @@ class ReferenceGloss:
         ways.throughput *= reflections.mirrored
         ways.direction = reflections.direction
         found = self.scene.closest(origin, ways.direction)
+        ways.throughput *= self.scene.tint(origin, ways.direction, found.distance, DIFFUSE_RAYS)
+        left = ways.surface.triangle
         if meets_lamps:
-            ways.brought += ways.throughput * self._lamps_met(point, ways.direction, found.distance, width)
+            met = self._lamps_met(point, ways.direction, found.distance, width, left)
+            ways.brought += ways.throughput * met
         ways.surface = self.scene.resolve(found, ways.direction, spread)
         missed = found.triangle < 0
         ways.position = origin + ways.direction * np.where(missed, 0.0, found.distance)[:, None]
-        emission = ways.surface.emission * self._share_of_rays(ways, found, width)[:, None]
+        emission = ways.surface.emission * self._share_of_rays(ways, found, width, left)[:, None]
         ways.brought += ways.throughput * np.where(missed[:, None], self._world(ways.direction), emission)
         ways.throughput[missed] = 0.0
 
@@ -168,12 +156,13 @@ class ReferenceGloss:
         point = ways.position + self.scene.origin
         for number, lamp in enumerate(self._lamps()):
             sample = direct_light.sample_light(lamp, point, sample_r2(light_keys(keys, number), index).astype(float))
+            group = lamp.link_group
             share = share_of_points(direct_light.extent(lamp, point), width)[:, None]
             radiance = places.lobe(sample.directions, width) * sample.irradiance * share
-            lit = radiance.any(axis=1)
+            lit = np.flatnonzero(radiance.any(axis=1) & self._falls_on(group, ways.surface.triangle))
             if lamp.casts_shadow:
-                ends = sample.distances[lit] * _SHADOW_END
-                lit[lit] = self.scene.visible(origin[lit], sample.directions[lit], ends)
+                way = origin[lit], sample.directions[lit], sample.distances[lit] * _SHADOW_END
+                radiance[lit] *= self._arriving(*way, group)
             sum_[lit] += radiance[lit]
         return sum_
 
@@ -183,7 +172,7 @@ class ReferenceGloss:
         if not self._emitters.count:
             return np.zeros_like(point)
         choice = sample_r3(shifted(keys, _CHOICE_STREAM, 0, 0), index)[:, 0].astype(float)
-        best, best_point = np.zeros_like(point), np.zeros_like(point)
+        best, best_point, best_group = np.zeros_like(point), np.zeros_like(point), np.zeros(len(point), int)
         best_weight, total = np.zeros(len(point)), np.zeros(len(point))
         for candidate in range(CANDIDATES):
             emitter = self._emitters.sample(sample_r3(keys, index * CANDIDATES + candidate).astype(float))
@@ -191,7 +180,9 @@ class ReferenceGloss:
             squared = np.maximum(np.einsum("ni,ni->n", offset, offset), 1e-20)
             direction = offset / np.sqrt(squared)[:, None]
             cosine = np.abs(np.einsum("ni,ni->n", direction, emitter.normal))
-            share = share_of_points(cosine / (CANDIDATES * emitter.density * squared), width)
+            extent = cosine / (CANDIDATES * emitter.density * squared)
+            share = share_of_points(np.where(self._passes(emitter.group), 0.0, extent), width)
+            share = np.where(self._falls_on(emitter.group, ways.surface.triangle), share, 0.0)
             factor = cosine / (squared * emitter.density) * share
             radiance = emitter.radiance * places.lobe(direction, width) * factor[:, None]
             weight = radiance.sum(axis=1)
@@ -201,31 +192,53 @@ class ReferenceGloss:
             choice[taken] *= total[taken] / weight[taken]
             choice[left] = (choice[left] * total[left] - weight[left]) / (total[left] - weight[left])
             best[taken], best_point[taken], best_weight[taken] = radiance[taken], emitter.point[taken], weight[taken]
-        lit = np.flatnonzero(best_weight > 0)
-        way = best_point[lit] - origin[lit]
-        length = np.maximum(np.linalg.norm(way, axis=1), 1e-20)
-        lit = lit[self.scene.visible(origin[lit], way / length[:, None], length * _SHADOW_END)]
+            best_group[taken] = emitter.group[taken]
         result = np.zeros_like(point)
-        result[lit] = best[lit] * (total[lit] / (best_weight[lit] * CANDIDATES))[:, None]
+        for group in np.unique(best_group):
+            lit = np.flatnonzero((best_weight > 0) & (best_group == group))
+            way = best_point[lit] - origin[lit]
+            length = np.maximum(np.linalg.norm(way, axis=1), 1e-20)
+            arriving = self._arriving(origin[lit], way / length[:, None], length * _SHADOW_END, group)
+            result[lit] = best[lit] * (total[lit] / (best_weight[lit] * CANDIDATES))[:, None] * arriving
         return result
 
-    def _lamps_met(self, point: np.ndarray, direction: np.ndarray, limit: np.ndarray, width: np.ndarray) -> np.ndarray:
+    def _falls_on(self, group: int | np.ndarray, triangle: np.ndarray) -> np.ndarray:
+        """(N,) bool: does light of ``group`` fall on ``triangle`` (N,)?"""
+        return self.scene.falls_on(group, self.scene.role[triangle])
+
+    def _passes(self, group: np.ndarray) -> np.ndarray:
+        """(N,) bool: is there anything that light of ``group`` (N,) passes?"""
+        return ~self.scene.links.blocks.all(axis=0)[group]
+
+    def _arriving(self, origin: np.ndarray, direction: np.ndarray, limit: np.ndarray, group: int) -> np.ndarray:
+        """(N, 3) what arrives along rays to emitters of ``group``."""
+        visible = self.scene.visible(origin, direction, limit, group)[:, None]
+        return visible * self.scene.tint(origin, direction, limit, group=group)
+
+    def _lamps_met(
+        self, point: np.ndarray, direction: np.ndarray, limit: np.ndarray, width: np.ndarray, left
+    ) -> np.ndarray:
         """(N, 3) radiance of lamps along mirrored rays, by the share that rays answer for."""
         world_point, sum_ = point + self.scene.origin, np.zeros_like(point)
         for lamp in self._lamps():
             share = 1 - share_of_points(direct_light.extent(lamp, world_point), width)[:, None]
-            sum_ += direct_light.met(lamp, world_point, direction, limit) * share
+            sum_ += (
+                direct_light.met(lamp, world_point, direction, limit)
+                * share
+                * self._falls_on(lamp.link_group, left)[:, None]
+            )
         return sum_
 
-    def _share_of_rays(self, ways: Ways, found: rays.Hits, width: np.ndarray) -> np.ndarray:
+    def _share_of_rays(self, ways: Ways, found: rays.Hits, width: np.ndarray, left: np.ndarray) -> np.ndarray:
         """(N,) of the emission of what they met that rays answer for."""
-        share = np.ones(len(found.triangle))
+        group = self.scene.links.group[self.scene.role[found.triangle]]
+        share = np.where((found.triangle < 0) | self._falls_on(group, left), 1.0, 0.0)
         met = np.flatnonzero((found.triangle >= 0) & (self._emitters.density[found.triangle] > 0))
         if len(met):
             density = self._emitters.density[found.triangle[met]]
             geometric = self.places(ways.at(met)).geometric
-            cosine = np.abs(np.einsum("ni,ni->n", ways.direction[met], geometric))
-            share[met] = 1 - share_of_points(cosine / (CANDIDATES * density * found.distance[met] ** 2), width[met])
+            cosine = np.abs(np.einsum("ni,ni->n", ways.direction[met], geometric)) * ~self._passes(group[met])
+            share[met] *= 1 - share_of_points(cosine / (CANDIDATES * density * found.distance[met] ** 2), width[met])
         return share
 
     # Texels
@@ -244,7 +257,7 @@ class ReferenceGloss:
         directions = texel_directions(face).reshape(-1, 3)[glossy % texels]
         origin = positions[glossy // texels]
         seen = Ways(directions, flat, origin + directions * flat.distance[:, None], zero + 1, zero.copy())
-        middle = _Middle(seen, self.places(seen), origin, glossy % texels, face, self.scene)
+        middle = Middle(seen, self.places(seen), origin, glossy % texels, face, self.scene)
         width = np.maximum(middle.places.alpha, middle.blur())
         keys = keys_of(nodes[glossy // texels], _TEXEL_STREAM, seed)
         looks, looked = looks_at(len(self._lamps())), np.zeros((len(glossy), 3))
@@ -255,22 +268,23 @@ class ReferenceGloss:
         diffuse, ways = self._send(middle.at(each), width[each], keys[each], (glossy[each] % texels) * TEXEL_RAYS + ray)
         return glossy[each], diffuse, ways, glossy, looked
 
-    def _look(self, middle: _Middle, width: np.ndarray, keys: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    def _look(self, middle: Middle, width: np.ndarray, keys: np.ndarray, numbers: np.ndarray) -> np.ndarray:
         """(G, 3) radiance that lamps send to texels by one place in each."""
         ways, light_keys_ = middle.through(sample_r3(shifted(keys, 0, _PLACE_STREAM, 0), numbers)), light_keys_of(keys)
         places = self.places(ways)
         light = self._lamps_in_gloss(places, ways, width, light_keys_, numbers)
         on = places.reflect(events_of(light_keys_, numbers, 0), sample_r2(light_keys_, numbers).astype(float))
         far = np.full(len(width), np.inf)
-        meets = np.flatnonzero(self._lamps_met(ways.position, on.direction, far, width).any(axis=1))
+        left = ways.surface.triangle
+        meets = np.flatnonzero(self._lamps_met(ways.position, on.direction, far, width, left).any(axis=1))
         some = ways.at(meets)
         limit = self.scene.closest(beginning(some), on.direction[meets]).distance
-        met = self._lamps_met(some.position, on.direction[meets], limit, width[meets])
+        met = self._lamps_met(some.position, on.direction[meets], limit, width[meets], left[meets])
         light[meets] += on.mirrored[meets] * met
         light[middle.hides(ways, light.any(axis=1))] = 0.0
         return light
 
-    def _send(self, middle: _Middle, width: np.ndarray, keys: np.ndarray, numbers: np.ndarray):
+    def _send(self, middle: Middle, width: np.ndarray, keys: np.ndarray, numbers: np.ndarray):
         ways = middle.through(sample_r3(shifted(keys, 0, _PLACE_STREAM, 1), numbers))
         hidden = np.flatnonzero(middle.hides(ways, np.ones(len(numbers), bool)))
         ways.put(hidden, middle.ways.at(hidden))
@@ -281,65 +295,6 @@ class ReferenceGloss:
         self.go_on(ways, reflections, width, False, 2.0 / middle.face)
         self.follow(ways, keys, numbers, 1, MOST_REFLECTIONS - 1, PATCH_BLUR, 2.0 / middle.face)
         return reflections.diffuse, ways
-
-
-@dataclass
-class _Middle:
-    """What glossy texels (G) see in their middle, and places around it on the planes of the same triangles."""
-
-    ways: Ways
-    places: GlossyPlaces
-    origin: np.ndarray  # (G, 3) of the probes
-    texel: np.ndarray  # (G,) of the probe
-    face: int
-    scene: ReferenceScene
-
-    def at(self, chosen: np.ndarray) -> _Middle:
-        ways, places = self.ways.at(chosen), self.places.at(chosen)
-        return _Middle(ways, places, self.origin[chosen], self.texel[chosen], self.face, self.scene)
-
-    def through(self, place: np.ndarray) -> Ways:
-        """The rays through ``place`` (G, 2 or more; 0..1) of the texels; the middle itself where the plane slants."""
-        ways = self.ways.at(np.arange(len(self.texel)))
-        direction = place_directions(self.texel, place.astype(float), self.face)
-        slope = np.einsum("ni,ni->n", self.places.geometric, direction)
-        ahead = np.einsum("ni,ni->n", self.places.geometric, ways.position - self.origin)
-        distance = ahead / np.where(slope < 0, slope, -1.0)
-        on = np.flatnonzero((slope <= -0.01) & (distance <= 2 * ways.surface.distance))
-        ways.direction[on], ways.surface.distance[on] = direction[on], distance[on]
-        ways.position[on] = self.origin[on] + distance[on, None] * direction[on]
-        ways.surface.normal[on] = self._normal(ways.at(on))
-        return ways
-
-    def _normal(self, ways: Ways) -> np.ndarray:
-        triangle = ways.surface.triangle
-        a, b, c = np.moveaxis(self.scene.triangles[triangle], 1, 0)
-        across = np.cross(b - a, c - a)
-        squared = np.einsum("ni,ni->n", across, across)
-        second = np.einsum("ni,ni->n", np.cross(ways.position - a, c - a), across) / squared
-        third = np.einsum("ni,ni->n", np.cross(b - a, ways.position - a), across) / squared
-        normal = interpolate(self.scene.snapshot.corner_normals[triangle], np.stack([second, third], axis=1))
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        return np.where(ways.surface.back[:, None], -normal, normal)
-
-    def blur(self) -> np.ndarray:
-        """(G,) least width of lobes in which texels see lamps."""
-        sides = (0.1, 0.5), (0.9, 0.5), (0.5, 0.1), (0.5, 0.9)
-        normals = [self.through(np.tile(side, (len(self.texel), 1))).surface.normal for side in sides]
-        bends = [np.linalg.norm(normals[i] - normals[i + 1], axis=1) for i in (0, 2)]
-        return TEXEL_BLUR * (np.pi / 4 / self.face + 1.25 * np.maximum(*bends))
-
-    def hides(self, ways: Ways, asked: np.ndarray) -> np.ndarray:
-        """(G,) bool: is something before those of ``ways`` that are ``asked`` (G,)?"""
-        result, ask = np.zeros(len(asked), bool), np.flatnonzero(asked)
-        limits = ways.surface.distance[ask] * _SIGHT_END
-        result[ask] = ~self.scene.visible(self.origin[ask], ways.direction[ask], limits)
-        return result
-
-
-def beginning(ways: Ways) -> np.ndarray:
-    """(N, 3) where rays begin that leave the surfaces that were met."""
-    return step_off(ways.position, ways.surface.normal, -ways.direction, ways.surface.distance)
 
 
 def texel_reflections(gloss: ReferenceGloss, surfaces: Surfaces, *how) -> TexelReflections:

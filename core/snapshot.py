@@ -14,6 +14,7 @@ import numpy as np
 
 from .camera import Camera
 from .gloss import Gloss
+from .light_links import UNLINKED, Links
 from .light_profiles import LightProfile
 
 NO_IMAGE = -1
@@ -57,10 +58,18 @@ class Material:
     alpha_from_color: bool = False  # the alpha input was fed by the colour output: use its mean
     alpha: float = 1.0
     alpha_threshold: float = 0.0
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)  # what holes leave of light that passes, times the tint image
+    tint_image: int = NO_IMAGE
     transmitted: tuple[float, float, float] = (0.0, 0.0, 0.0)
     gloss: Gloss | None = None
     unseen_by: int = 0  # sum of SHADOW_RAYS, DIFFUSE_RAYS and FROM_BEHIND: for these the surface is not there
+    links: Links = UNLINKED  # which emitters' light falls on it, and passes it
     backface_culling: bool = False  # stated only; light transport treats every surface as two-sided, like Cycles
+
+    @property
+    def is_tinted(self) -> bool:
+        """Whether it has holes, and they are coloured."""
+        return self.alpha_threshold > 0 and (self.tint != (1.0, 1.0, 1.0) or self.tint_image != NO_IMAGE)
 
 
 @dataclass(frozen=True)
@@ -99,6 +108,7 @@ class Light:
     dynamic: bool = False  # animated or marked dynamic: its direct light is not kept
     group: str = ""  # role in Explore mode and in reports
     profile: LightProfile | None = None  # what nodes make of its light; not of suns
+    link_group: int = 0  # see core.light_links
 
 
 @dataclass(frozen=True)

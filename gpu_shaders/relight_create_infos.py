@@ -35,10 +35,9 @@ def surface_again_comp(info, defines):
     _image(info, 3, "rebind", pixel="R32F")
     _ints(info, "first_slot")
     info.local_group_size(8, 8, 1)
-    files = (
-        ["random_lib", "surface_lib", *gloss_files(defines, rays=False)] if "HAS_GLOSS" in defines else ["surface_lib"]
-    )
-    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *files, "surface_again_comp"]}
+    gloss_lib = ["random_lib", *gloss_files(defines, rays=False)] if "HAS_GLOSS" in defines else []
+    files = ["surface_lib", "offset_lib", "ray_lib", *gloss_lib, "surface_again_comp"]
+    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *files]}
 
 
 def layers_move_comp(info, defines):

@@ -7,24 +7,22 @@ float32.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import gpu
 import numpy as np
 
 from ..core import bvh, emitters
 from ..core.errors import InputError
 from ..core.gloss import gloss_rows
-from ..core.light_profiles import LightProfile
+from ..core.light_links import link_roles
 from ..core.scene_changes import SceneChanges, ShapeChange, boxes_around
 from ..core.sheets import sheet_numbers
 from ..core.snapshot import Light, SceneSnapshot
 from ..core.steps import Pace, Steps, run
 from .image_textures import send_images
+from .lamp_rows import pack_lights, with_profiles
 from .scatter import scatter_rows
 from .textures import upload
 
-_POINT, _SPOT, _SUN, _RECTANGLE, _ELLIPSE = range(5)
 _STACK_STEP = 8  # sizes of traversal stacks are multiples of it, so that most edits of a scene need no new shaders
 _MOST_TRIANGLES = 1 << 24  # their numbers are kept as float32, which knows every whole number up to here
 
@@ -83,6 +81,7 @@ class SceneTextures:
         rebuilt.
         """
         hierarchy = "kept" if changes.shape is None else self._reshape(snapshot, changes.shape)
+        groups = self._links.groups
         if hierarchy == "rebuilt" or changes.materials or changes.emission or changes.reflectance:
             assert emitter_density is not None
             self._send_surfaces(snapshot, emitter_density)
@@ -93,7 +92,7 @@ class SceneTextures:
             self._send_surfaces(snapshot, emitter_density, np.flatnonzero(differs))
         if changes.images:
             self._send_images(snapshot)
-        if changes.any_light:
+        if changes.any_light or groups != self._links.groups:
             self.set_lights(snapshot.lights, self._origin)
         return hierarchy
 
@@ -102,6 +101,7 @@ class SceneTextures:
         self.light_count = len(lights)
         self._lights = pack_lights(lights, origin)
         self._profiles = [light.profile for light in lights]
+        self._groups = np.array([light.link_group for light in lights], np.int64)
         self._send_lights()
 
     def set_suns(self, suns: list[Light]) -> None:
@@ -113,6 +113,8 @@ class SceneTextures:
     def _send_lights(self) -> None:
         """Lamps, suns, and what nodes make of lamps' light."""
         rows = np.concatenate([self._lights, self._suns])
+        known = self._groups <= self._links.groups  # others light everything that there is
+        rows[: len(known), 4, 3] += 2 * self._groups * known
         self._textures["lights"] = upload(with_profiles(rows, self._profiles), "lights")
 
     def _build(self, snapshot: SceneSnapshot) -> None:
@@ -146,7 +148,7 @@ class SceneTextures:
         """Materials, sheets, emitters, and corners and attributes of all triangles or of those at ``only`` (K,) in leaf
         order."""
         for name, values in self._surface_rows(snapshot, density, slice(None) if only is None else only).items():
-            if only is None or name in ("materials", "sheets", "gloss_rows", "emitters"):
+            if only is None or name in ("materials", "sheets", "links", "tints", "gloss_rows", "emitters"):
                 self._textures[name] = upload(values, name.replace("_", " "))
             elif len(only):
                 scatter_rows(self._textures[name], only, values)
@@ -157,9 +159,11 @@ class SceneTextures:
         order = self.hierarchy.order
         clips = np.array([m.alpha_threshold > 0 for m in snapshot.materials] or [False])
         unseen = np.array([m.unseen_by for m in snapshot.materials] or [0])
-        self.has_alpha, self.has_unseen = bool(clips.any()), bool(unseen.any())
-        sheet_of_material, shares = sheet_numbers(snapshot.materials)
-        self.has_sheets = len(shares) > 1
+        tinted = np.array([m.is_tinted for m in snapshot.materials] or [False])
+        self.has_alpha, self.has_unseen, self.has_tint = bool(clips.any()), bool(unseen.any()), bool(tinted.any())
+        self._links = link_roles([m.links for m in snapshot.materials])
+        sheet_of_material, sheets = sheet_numbers(snapshot.materials, self._links.of_surface)
+        self.has_sheets = len(sheets) > 1
         self.has_gloss = any(material.gloss is not None for material in snapshot.materials)
         self._density = density[order]
         self.emitter_count = int(np.count_nonzero(self._density))
@@ -169,11 +173,15 @@ class SceneTextures:
         rows = np.zeros((len(corners), 3, 4), np.float32)
         rows[:, :, :3] = corners
         rows[:, 0, 3] = self.hierarchy.leaf_end[at]
-        rows[:, 1, 3] = clips[material] + 2 * unseen[material]  # bits, see ray_lib
+        roles = self._links.of_surface[material]
+        # Bits, see ray_lib.
+        rows[:, 1, 3] = clips[material] + 2 * unseen[material] + 16 * tinted[material] + 32 * roles
         rows[:, 2, 3] = sheet_of_material[material]
         return {
             "materials": _materials(snapshot),
-            "sheets": np.pad(shares, ((0, 0), (0, 1))).astype(np.float32),
+            "sheets": sheets.astype(np.float32),
+            "links": self._links.rows(),
+            "tints": _tints(snapshot),
             "gloss_rows": gloss_rows([material.gloss for material in snapshot.materials]),
             "emitters": _emitters(self._density, self.corners, order),
             "triangle_corners": rows,
@@ -194,6 +202,9 @@ class SceneTextures:
             "HAS_IMAGES": self.has_images,
             "HAS_UNSEEN": self.has_unseen,
             "HAS_PROFILES": any(profile is not None for profile in self._profiles),
+            "HAS_TINT": self.has_tint,
+            "HAS_LINKS": self._links.groups > 0,
+            "LINK_GROUPS": self._links.groups or None,
             "STACK_SIZE": stack_size,
             "LEAN_STACK": gpu.platform.device_type_get() != "SOFTWARE",
         }
@@ -245,8 +256,12 @@ class SceneTextures:
     def bind_rays(self, shader) -> None:
         """Binds what a shader compiled with ``ray_defines`` and no surfaces declares."""
         self.bind(shader, "bvh_nodes", "triangle_corners")
+        if self._links.groups:
+            self.bind(shader, "links")
         if self.has_alpha:
             self.bind(shader, "triangle_attributes", "materials")
+            if self.has_tint:
+                self.bind(shader, "tints")
             if self.has_images:
                 self.bind(shader, "image_table", "image_texels")
 
@@ -279,6 +294,10 @@ class SceneTextures:
     def bind_surfaces(self, shader) -> None:
         """Binds what a shader compiled with ``surface_defines`` declares."""
         self.bind(shader, "bvh_nodes", "triangle_corners", "triangle_attributes", "materials")
+        if self.has_tint:
+            self.bind(shader, "tints")
+        if self._links.groups:
+            self.bind(shader, "links")
         if self.has_images:
             self.bind(shader, "image_table", "image_texels")
 
@@ -342,46 +361,6 @@ def _materials(snapshot: SceneSnapshot) -> np.ndarray:
     return rows
 
 
-def pack_lights(lights: list[Light], origin: np.ndarray) -> np.ndarray:
-    """(lights, 6, 4) rows of direct_light_lib's lights, positions relative to ``origin``."""
-    rows = np.zeros((len(lights), 6, 4), np.float32)
-    for row, light in zip(rows, lights):
-        matrix = np.asarray(light.matrix, float)
-        row[0, :3] = matrix[:3, 3] - origin
-        row[1, :3] = light.color
-        row[2, :3], row[3, :3], row[4, :3] = matrix[:3, 0], matrix[:3, 1], matrix[:3, 2]
-        row[4, 3] = light.casts_shadow
-        if light.kind == "SUN":
-            row[0, 3] = _SUN
-            row[1, 3] = 1 - np.cos(light.angle / 2)
-        elif light.kind == "AREA":
-            row[0, 3] = _ELLIPSE if light.shape == "ELLIPSE" else _RECTANGLE
-            row[2, 3], row[3, 3] = light.size_x, light.size_y
-            if light.spread < np.pi - 1e-4:
-                half = max(light.spread / 2, 1e-3)
-                row[5, :2] = np.tan(half), 1 / (np.tan(half) - half)
-        else:
-            row[0, 3] = _SPOT if light.kind == "SPOT" else _POINT
-            row[1, 3] = light.radius
-            row[5, 2] = light.soft_falloff
-            if light.kind == "SPOT":
-                row[2, 3], row[3, 3] = (
-                    light.spot_scale[2] / light.spot_scale[0],
-                    light.spot_scale[2] / light.spot_scale[1],
-                )
-                cosine = np.cos(light.spot_size / 2)
-                row[5, :2] = cosine, 1 / max((1 - cosine) * light.spot_blend, 1e-6)
-    return rows
-
-
-def with_profiles(rows: np.ndarray, profiles: Sequence[LightProfile | None]) -> np.ndarray:
-    """(N, 4) elements of direct_light_lib's lights: ``rows`` (lights, 6, 4), with what nodes make of the light of the
-    first of them after all."""
-    rows = rows.copy()
-    end, parts = 6 * len(rows), []
-    for row, profile in zip(rows, profiles):
-        if profile is not None:
-            row[5, 3] = end
-            parts.append(profile.rows())
-            end += len(parts[-1])
-    return np.concatenate([rows.reshape(-1, 4), *parts])
+def _tints(snapshot: SceneSnapshot) -> np.ndarray:
+    """(M, 4) elements of surface_lib's tints."""
+    return np.array([(*m.tint, m.tint_image) for m in snapshot.materials] or [(1, 1, 1, -1)], np.float32)

@@ -94,6 +94,11 @@ vec3 lamps_met(vec3 point, vec3 direction, float limit, float width)
 {
   vec3 sum = vec3(0.0);
   for (int light = 0; light < light_count; light++) {
+#ifdef HAS_LINKS
+    if (!falls_on(group_of_light(light), lit_role)) {
+      continue;
+    }
+#endif
     vec3 radiance = lamp_met(light, point, direction, limit);
     if (radiance != vec3(0.0)) {
       sum += radiance * (1.0 - share_of_points_on(lamp_extent(light, point), width));
@@ -107,6 +112,13 @@ vec3 lamps_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float 
 {
   vec3 sum = vec3(0.0);
   for (int light = 0; light < light_count; light++) {
+    int group = 0;
+#ifdef HAS_LINKS
+    group = group_of_light(light);
+    if (!falls_on(group, lit_role)) {
+      continue;
+    }
+#endif
     vec2 u = sample_r2(key + uvec3(0u, 0u, uint(light) * 0x9E3779B9u), index);
     LightSample light_sample = sample_light(light, surface.position, u);
     vec3 radiance = gloss_lobe(gloss, surface, view, light_sample.direction, width) * light_sample.irradiance *
@@ -114,18 +126,22 @@ vec3 lamps_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float 
     if (radiance == vec3(0.0)) {
       continue;
     }
-    bool shadow = element(lights, 6 * light + 4).w != 0.0;
-    if (!shadow || !trace_any(origin, light_sample.direction, light_sample.distance * 0.9999)) {
-      sum += radiance;
-    }
+    bool shadow = (int(element(lights, 6 * light + 4).w) & 1) != 0;
+    sum += shadow ? radiance * light_along(origin, light_sample.direction, light_sample.distance * 0.9999, group) : radiance;
   }
   return sum;
 }
 
 #ifdef HAS_EMITTERS
-/* Steradians that each of CANDIDATES points on an emitter stands for. */
-float emitter_extent(float density, float distance, float emitter_cosine)
+/* Steradians that each of CANDIDATES points on an emitter of the `group` stands for; 0 where points answer for all, as light of the group passes
+ * surfaces, at which rays end. */
+float emitter_extent(int group, float density, float distance, float emitter_cosine)
 {
+#ifdef HAS_LINKS
+  if (has_passage(group)) {
+    return 0.0;
+  }
+#endif
   return emitter_cosine / (float(CANDIDATES) * density * distance * distance);
 }
 
@@ -133,6 +149,7 @@ float emitter_extent(float density, float distance, float emitter_cosine)
 vec3 emitters_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float width, uvec3 key, int index)
 {
   vec3 best_radiance = vec3(0.0), best_point = vec3(0.0);
+  int best_group = 0;
   float best_weight = 0.0, total = 0.0;
   float choice = sample_r3(key + uvec3(0x68E31DA4u, 0u, 0u), index).x;
   for (int i = 0; i < CANDIDATES; i++) {
@@ -144,13 +161,14 @@ vec3 emitters_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, flo
     float cosine = abs(dot(direction, emitter.normal));
     vec3 radiance = emitter.radiance * gloss_lobe(gloss, surface, view, direction, width) *
                     (cosine / (squared * emitter.density) *
-                     share_of_points_on(emitter_extent(emitter.density, distance, cosine), width));
+                     share_of_points_on(emitter_extent(emitter.group, emitter.density, distance, cosine), width));
     float weight = radiance.r + radiance.g + radiance.b;
     total += weight;
     if (weight > 0.0 && choice * total < weight) {
       choice = choice * total / weight;
       best_radiance = radiance;
       best_point = emitter.point;
+      best_group = emitter.group;
       best_weight = weight;
     }
     else if (total > weight) {
@@ -159,10 +177,11 @@ vec3 emitters_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, flo
   }
   vec3 way = best_point - origin;
   float way_length = max(length(way), 1.0e-20);
-  if (best_weight == 0.0 || trace_any(origin, way / way_length, way_length * 0.9999)) {
+  if (best_weight == 0.0) {
     return vec3(0.0);
   }
-  return best_radiance * (total / (best_weight * float(CANDIDATES)));
+  vec3 arriving = light_along(origin, way / way_length, way_length * 0.9999, best_group);
+  return best_radiance * (total / (best_weight * float(CANDIDATES))) * arriving;
 }
 #endif
 
@@ -176,13 +195,20 @@ vec3 light_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float 
   return radiance;
 }
 
-/* Of a sampled emitter that a mirrored ray meets, the share that rays answer for. */
+/* Of the emission that a mirrored ray meets, the share that rays answer for. */
 float emitter_share_of_rays(Surface surface, int triangle, vec3 direction, float distance, float width)
 {
+  int group = 0;
+#ifdef HAS_LINKS
+  group = group_of_triangle(triangle);
+  if (!falls_on(group, lit_role)) {
+    return 0.0;
+  }
+#endif
 #ifdef HAS_EMITTERS
   if (surface.emitter_density > 0.0) {
     float cosine = abs(dot(direction, triangle_normal(triangle, -direction)));
-    return 1.0 - share_of_points_on(emitter_extent(surface.emitter_density, distance, cosine), width);
+    return 1.0 - share_of_points_on(emitter_extent(group, surface.emitter_density, distance, cosine), width);
   }
 #endif
   return 1.0;

@@ -25,6 +25,7 @@ void go_on(inout Way way, Reflection reflection, float width, bool meets_lamps, 
   way.throughput *= reflection.mirrored;
   way.direction = reflection.direction;
   way.hit = trace_closest(origin, way.direction);
+  way.throughput *= passed_to(origin, way.direction, way.hit.distance);
   if (meets_lamps) {
     way.brought += way.throughput * lamps_met(point, way.direction, way.hit.distance, width);
   }
@@ -37,6 +38,9 @@ void go_on(inout Way way, Reflection reflection, float width, bool meets_lamps, 
   way.surface = resolve_surface(way.hit.triangle, way.hit.barycentric, origin, way.direction, spread);
   way.brought += way.throughput * way.surface.emission *
                  emitter_share_of_rays(way.surface, way.hit.triangle, way.direction, way.hit.distance, width);
+#ifdef HAS_LINKS
+  lit_role = role_of_triangle(way.hit.triangle);
+#endif
 }
 
 /* Follows the ray `number` of `key`, whose reflections count from `first` on, `most` of them; it sees lamps in lobes of at least `blur`.

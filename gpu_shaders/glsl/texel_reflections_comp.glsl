@@ -78,6 +78,9 @@ void main()
   vec3 diffuse = vec3(0.0), brought = vec3(0.0);
   float width = 0.0;
   if (is_glossy) {
+#ifdef HAS_LINKS
+    lit_role = role_of_triangle(triangle);
+#endif
     vec2 barycentric = barycentric_of(triangle, slot.xyz + direction * abs(seen.z));
     Surface surface = resolve_surface(triangle, barycentric, slot.xyz, direction, 2.0 / float(FACE));
     vec2 inside = max(barycentric, vec2(0.0)); /* rasterised triangles reach over their edges, see texel_hits_comp */
@@ -87,6 +90,7 @@ void main()
       surface.position = interpolate(element(triangle_corners, 3 * triangle).xyz, element(triangle_corners, 3 * triangle + 1).xyz,
                                      element(triangle_corners, 3 * triangle + 2).xyz, inside);
     }
+    surface.albedo *= passed_to(slot.xyz, direction, abs(seen.z) * 0.9999);
     middle = Way(direction, Hit(abs(seen.z), triangle, barycentric), surface, vec3(1.0), vec3(0.0));
     width = max(gloss.alpha, blur_of(middle, slot.xyz, id.xy));
     int looks = light_count > 0 ? clamp(LOOKS_IN_ALL / light_count, LEAST_LOOKS, LOOKS) : 0;
@@ -106,6 +110,7 @@ void main()
     vec4 end = vec4(0.0, 0.0, 0.0, -1.0);
     vec3 sent = vec3(0.0);
     int sheet = 0;
+    bool on_surface = false;
     if (is_glossy) {
       int ray_number = number * REFLECTIONS + ray;
       uvec3 event = reflection_event(key, ray_number, 0);
@@ -114,6 +119,9 @@ void main()
         way = middle;
       }
       vec2 first = sample_r2(key, ray_number);
+#ifdef HAS_LINKS
+      lit_role = role_of_triangle(triangle);
+#endif
       Reflection reflection = reflect_at(gloss, way.surface, triangle, -way.direction, event, first);
       diffuse += reflection.diffuse;
 #ifdef HAS_EMITTERS
@@ -127,8 +135,9 @@ void main()
       if (sent != vec3(0.0)) {
 #ifdef HAS_SHEETS
         sheet = sheet_of_triangle(way.hit.triangle);
+        on_surface = share_of_back(sheet) != vec3(0.0);
 #endif
-        end.xyz = sheet > 0 ? way.surface.position : pull_back(way.surface.position, way.direction, way.hit.distance);
+        end.xyz = on_surface ? way.surface.position : pull_back(way.surface.position, way.direction, way.hit.distance);
         end.w = pack_normal(octahedral_encode(way.surface.normal));
       }
     }
