@@ -127,7 +127,7 @@ def stages(gpu_context):
     materials[0] = Material(
         **{**vars(materials[0]), "gloss": Gloss((0.1, 0.1, 0.1), (0.04, 0.04, 0.04), 0.1, fixed=True)}
     )
-    materials[5] = Material(**{**vars(materials[5]), "transmitted": (0.5, 0.2, 0.1)})
+    materials[5] = Material(**{**vars(materials[5]), "transmitted": (0.5, 0.2, 0.1), "tint": (0.9, 0.5, 0.3)})
     snapshot = snapshot_of(
         corners,
         [*room.material_index, 6],
@@ -170,6 +170,17 @@ def test_what_texels_mirror(stages, reflected):
     sent = expected.sent.reshape(found[:, :, 1:, :3].shape)
     assert close(found[:, :, 1:, :3] * counted, sent, 5e-3)[glossy].mean() > 0.96
     assert sent[glossy].any(axis=-1).mean() > 0.3, "rays end on surfaces"
+
+
+def test_what_probes_see_mirrored_counts_as_seen(stages, reflected):
+    found, patches = reflected[0], stages.light.patches
+    patches.forget_seen()
+    patches.mark_seen(stages.gpu.textures, 8, np.array([1, 2]), stages.backend.gloss.defines)
+    ends = np.concatenate([found[1:3, :, 1:, 3].ravel(), stages.patch()[1:3].ravel()])
+    expected = np.zeros(patches.count, bool)
+    expected[ends[ends >= 0].astype(int)] = True
+    np.testing.assert_array_equal(patches.read_seen(), expected)
+    assert 0 < expected.sum() < patches.count
 
 
 @pytest.mark.parametrize("segments", [1, 3])
