@@ -17,15 +17,13 @@ from ..core.blocks import Block, cut
 from ..core.clearance import Obstacles
 from ..core.conventions import CULLED
 from ..core.emitters import sampling_density
-from ..core.grid import Grid
 from ..core.orientation import ShellVote
-from ..core.probe_edits import ProbeEdits
 from ..core.scene_changes import SceneChanges, compare
-from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..core.steps import Pace, Steps
 from ..gpu_shaders.backend import probes_in_budget
 from ..gpu_shaders.scene_textures import SceneTextures
+from .bake_job import BakeJob
 from .capture_choice import choose_capture
 from .cull import cull
 from .finish import complete, tell
@@ -42,24 +40,20 @@ class BlockGround:
 
     def __init__(
         self,
-        snapshot: SceneSnapshot,
-        grid: Grid,
-        settings: BakeSettings,
-        edits: ProbeEdits,
+        job: BakeJob,
         state: np.ndarray,
         scene: SceneTextures,
         capture: str,
         pace: Pace | None = None,
     ):
-        self.snapshot, self.grid, self.settings, self.edits, self.state = snapshot, grid, settings, edits, state
-        self.scene, self.capture, self._pace = scene, capture, pace
-        blocks = cut(grid, settings.block)
+        self.job, self.state, self.scene, self.capture, self._pace = job, state, scene, capture, pace
+        blocks = cut(job.grid, job.settings.block)
         self.blocks = [block for block in blocks if len(blocks) == 1 or len(self.captured(block))]
         self._obstacles: Obstacles | None = None
 
     @property
     def object_count(self) -> int:
-        return max(len(self.snapshot.object_names), 1)
+        return max(len(self.job.snapshot.object_names), 1)
 
     def captured(self, block: Block) -> np.ndarray:
         """(S,) nodes of ``block`` that capture, ascending."""
@@ -68,12 +62,10 @@ class BlockGround:
 
     def open(self, block: Block) -> Steps[VolumeBake]:
         """``block``, with nothing captured yet."""
-        state = np.full(self.grid.count, CULLED, np.uint8)
+        state = np.full(self.job.grid.count, CULLED, np.uint8)
         state[self.captured(block)] = self.state[self.captured(block)]
         part = Part(block, state, self.capture, self.obstacles(block))
-        bake = VolumeBake(
-            self.snapshot, self.grid, self.settings, Silent(), self.edits, pace=self._pace, scene=self.scene, part=part
-        )
+        bake = VolumeBake(self.job, Silent(), pace=self._pace, scene=self.scene, part=part)
         yield from bake.open()
         return bake
 
@@ -94,15 +86,15 @@ class BlockGround:
     def obstacles(self, block: Block) -> Obstacles:
         """What the probes of ``block`` keep clear of: triangles within two cells, no probe reaches others."""
         if self._obstacles is None:
-            self._obstacles = Obstacles.of(self.grid, self.snapshot)
+            self._obstacles = Obstacles.of(self.job.grid, self.job.snapshot)
         if block.is_whole:
             return self._obstacles
         return self._obstacles.within(np.array(block.low) - 2, np.array(block.high) + 1)
 
     def follow_lamps(self, snapshot: SceneSnapshot, open_blocks: list[VolumeBake]) -> Steps[None]:
         """The same scene in the light of other lamps: ``open_blocks`` go back to where ``see`` begins."""
-        self.snapshot = snapshot
-        self.scene.set_lights(snapshot.lights, self.grid.center)
+        self.job = replace(self.job, snapshot=snapshot)
+        self.scene.set_lights(snapshot.lights, self.job.grid.center)
         for bake in open_blocks:
             bake.snapshot = snapshot
             yield from bake.start_over()
@@ -120,20 +112,11 @@ class BlockSession:
 
     backend = None  # there is one a block
 
-    def __init__(
-        self,
-        snapshot: SceneSnapshot,
-        grid: Grid,
-        settings: BakeSettings,
-        reporter: Reporter,
-        edits: ProbeEdits | None = None,
-        result: BakeResult | None = None,
-        pace: Pace | None = None,
-    ):
-        self.snapshot, self.grid, self.settings = snapshot, grid, settings
+    def __init__(self, job: BakeJob, reporter: Reporter, result: BakeResult | None = None, *, pace: Pace | None = None):
+        self._job, self.snapshot, self.grid, self.settings = job, job.snapshot, job.grid, job.settings
         self.result = result or BakeResult()
         self._reporter = reporter
-        self._edits = edits or ProbeEdits.none(grid)
+        self._edits = job.probe_edits
         self._pace = pace or Pace(None)
         self._stopwatch = Stopwatch(self.result.seconds)
         self.unshown = np.zeros(0, bool)  # probes are never shown one by one
@@ -164,9 +147,7 @@ class BlockSession:
         capture, reason = choose_capture(self.settings, scene.triangle_count, probes)
         self.result.scene, self.result.capture = scene, capture
         self.result.notes.append(reason)
-        self._ground = BlockGround(
-            self.snapshot, self.grid, self.settings, self._edits, state, scene, capture, self._pace
-        )
+        self._ground = BlockGround(replace(self._job, snapshot=self.snapshot), state, scene, capture, self._pace)
         self._keeps = probes <= probes_in_budget(self.settings)
         yield from self._light()
 
@@ -280,14 +261,8 @@ AnySession = BakeSession | BlockSession
 
 
 def open_session(
-    snapshot: SceneSnapshot,
-    grid: Grid,
-    settings: BakeSettings,
-    reporter: Reporter,
-    edits: ProbeEdits | None = None,
-    result: BakeResult | None = None,
-    pace: Pace | None = None,
+    job: BakeJob, reporter: Reporter, result: BakeResult | None = None, *, pace: Pace | None = None
 ) -> AnySession:
-    """The session of a grid, in one block or in several."""
-    kind = BakeSession if grid.count <= settings.block else BlockSession
-    return kind(snapshot, grid, settings, reporter, edits, result, pace=pace)
+    """The session of a job, in one block or in several."""
+    kind = BakeSession if job.grid.count <= job.settings.block else BlockSession
+    return kind(job, reporter, result, pace=pace)

@@ -21,13 +21,12 @@ from ..core import adaptive_bands, lookup
 from ..core.conventions import ACTIVE
 from ..core.error_budget import ErrorGoal, ErrorModel, Level, cost_of_paths, first_level, next_level, worst_probes
 from ..core.field import Field
-from ..core.grid import Grid
 from ..core.path_check import MOST_BANDS, NORMALS, SquaredError, irradiance_of
 from ..core.probe_edits import ProbeEdits
 from ..core.settings import BakeSettings
-from ..core.snapshot import SceneSnapshot
 from ..core.steps import Pace, Steps
 from ..gpu_shaders.scene_textures import SceneTextures
+from .bake_job import BakeJob
 from .block_session import AnySession, open_session
 from .deringing import dering_field
 from .followed_paths import FollowedPaths
@@ -61,19 +60,19 @@ class ErrorDrivenBake:
 
     def __init__(
         self,
-        snapshot: SceneSnapshot,
-        grid: Grid,
-        settings: BakeSettings,
+        job: BakeJob,
         goal: ErrorGoal,
         reporter: Reporter,
-        edits: ProbeEdits | None = None,
         result: BakeResult | None = None,
+        *,
         pace: Pace | None = None,
     ):
-        self.snapshot, self.grid, self.goal = snapshot, grid, goal
+        """``job``: its settings say where to begin, and what ``goal`` does not decide."""
+        self.snapshot, self.grid, self.goal = job.snapshot, job.grid, goal
         self._reporter = reporter
         self._pace = pace or Pace(None)
-        self._edits = edits or ProbeEdits.none(grid)
+        self._edits = job.probe_edits
+        settings = job.settings
         self._deringing = settings.deringing
         tolerance = settings.tolerance if "tolerance" in goal.kept else float(np.clip(_TAIL * goal.target, 1e-4, 2e-2))
         bands = settings.bands if "bands" in goal.kept else MOST_BANDS
@@ -118,10 +117,10 @@ class ErrorDrivenBake:
 
     def _open(self, settings: BakeSettings, edits: ProbeEdits, result: BakeResult | None = None) -> AnySession:
         """A session that uses the scene on the GPU, or one of several blocks, which sends it itself."""
-        what = self.snapshot, self.grid, settings, self._reporter, edits, result
+        job = BakeJob(self.snapshot, self.grid, settings, edits)
         if self.grid.count > settings.block:
-            return open_session(*what, pace=self._pace)
-        return BakeSession(*what, pace=self._pace, scene=self._scene)
+            return open_session(job, self._reporter, result, pace=self._pace)
+        return BakeSession(job, self._reporter, result, pace=self._pace, scene=self._scene)
 
     def _find_level(self) -> Steps[None]:
         """Checks and refines until the target is met or nothing helps."""
@@ -303,7 +302,7 @@ class ErrorDrivenBake:
         result.notes.append("error-driven: " + "; ".join(self._passes))
         if error is None:
             result.field = self._light.field
-            result.warnings.append(f"{self.grid.name}: --error {target:g}: {why}")
+            result.warnings.append(f"{self.grid.name}: an error of {100 * target:g} % was asked for: {why}")
             result.error = {"target": target, "predicted": None, "met": None, "reason": why}
         else:
             bands = self._fewest_bands(error)
@@ -358,7 +357,7 @@ class ErrorDrivenBake:
         if not met:
             allowed = f"{field.bands} bands alone lose {100 * floor.estimate:.2g} %"
             self.result.warnings.append(
-                f"{self.grid.name}: --error {target:g} was not reached, the error is {100 * predicted:.2g} % by "
+                f"{self.grid.name}: an error of {100 * target:g} % was not reached, it is {100 * predicted:.2g} % by "
                 f"estimate (up to {100 * final.bound(_SURE):.2g} %); stopped by {why}; {allowed}"
             )
         between = self._between

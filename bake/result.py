@@ -124,7 +124,7 @@ def report_on(result: BakeResult, grid: Grid, settings: BakeSettings, reporter: 
     if is_unsettled(result, settings):
         reporter.warn(
             f"{grid.name}: the light has not settled after {result.iterations} iterations; the files are "
-            "written and marked. Raise --tolerance, or darken materials that reflect all light"
+            "written and marked. Raise the tolerance (--tolerance), or darken materials that reflect all light"
         )
         return False
     return True

@@ -15,14 +15,13 @@ import numpy as np
 from ..core.blocks import Block
 from ..core.clearance import Obstacles
 from ..core.conventions import ACTIVE, CULLED
-from ..core.grid import Grid
 from ..core.orientation import ShellVote, inside_solid
-from ..core.probe_edits import ProbeEdits
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..core.steps import Pace, Steps
 from ..gpu_shaders.backend import GpuBackend
 from ..gpu_shaders.scene_textures import SceneTextures
+from .bake_job import BakeJob
 from .batches import Batches
 from .capture_choice import choose_capture
 from .convergence import MANY_MODES, Convergence
@@ -47,33 +46,30 @@ class Part:
 
 
 class VolumeBake:
-    """``result`` is filled by ``bake``; it may be given.
-
-    ``edits``: probes that the user switched off or moved. Moved ones capture where they were put and are not relocated.
-    ``stopwatch``: one that measures more than seconds by phase.
-    """
+    """``result`` is filled by ``bake``; it may be given."""
 
     def __init__(
         self,
-        snapshot: SceneSnapshot,
-        grid: Grid,
-        settings: BakeSettings,
+        job: BakeJob,
         reporter: Reporter,
-        edits: ProbeEdits | None = None,
         result: BakeResult | None = None,
+        *,
         stopwatch: Stopwatch | None = None,
         pace: Pace | None = None,
         scene: SceneTextures | None = None,
         part: Part | None = None,
     ):
-        """``pace``: how much is done in a step; without one steps are as large as they come. ``scene``: ``snapshot`` on
-        the GPU, from another session of the same grid. ``part``: bake this part of the grid, for block_session.py."""
-        self.snapshot = snapshot
-        self.grid = grid
-        self.settings = settings
+        """
+        Args:
+            stopwatch: one that measures more than seconds by phase.
+            pace: how much is done in a step; without one steps are as large as they come.
+            scene: the job's scene on the GPU, from another session of the same grid.
+            part: bake this part of the grid, for block_session.py.
+        """
+        self.snapshot, self.grid, self.settings = job.snapshot, job.grid, job.settings
         self.result = result or BakeResult()
         self._reporter = reporter
-        self._edits = edits or ProbeEdits.none(grid)
+        self._edits = job.probe_edits
         self._stopwatch = stopwatch or Stopwatch({})
         self._stopwatch.seconds = self.result.seconds
         self._pace = pace or Pace(None)

@@ -192,6 +192,7 @@ def is_frame(state: str) -> bool:
 def run(args, reporter, should_stop):
     import bpy
 
+    from ..bake.bake_job import BakeJob
     from ..scene.open_file import open_blend, set_frame
     from ..scene.probe_objects import edits_of
     from ..scene.read import read_scene
@@ -215,11 +216,9 @@ def run(args, reporter, should_stop):
         if should_stop():
             raise Cancelled("cancelled")
         pipeline.start_gpu(reporter, stopwatch)
-        edits = [edits_of(scene, grid) for grid in grids]
+        jobs = [BakeJob(snapshot, grid, settings, edits_of(scene, grid)) for grid in grids]
         kept: list | None = [] if args.relight else None
-        results = pipeline.bake_volumes(
-            snapshot, grids, settings, reporter, should_stop, stopwatch, edits, kept, goal_from(args)
-        )
+        results = pipeline.bake_volumes(jobs, reporter, should_stop, stopwatch, goal_from(args), kept)
         title = Path(args.file or bpy.data.filepath or scene.name).name
         summary, status = pipeline.write_results(
             title, snapshot, settings, results, folder, reporter, should_stop, stopwatch, args.pictures

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..bake.bake_job import BakeJob
 from ..bake.job import drive
 from ..bake.session import BakeSession
 from ..core import camera as cameras
@@ -209,7 +210,7 @@ class _Views:
 def _where_it_goes(snapshot: SceneSnapshot, grid, settings: BakeSettings, should_stop) -> None:
     """Relights in one go: whole, by phase, by shader, by function of Python."""
     clock = PhaseClock()
-    session = BakeSession(snapshot, grid, settings, clock, stopwatch=clock)
+    session = BakeSession(BakeJob(snapshot, grid, settings), clock, stopwatch=clock)
     drive(session.bake(), should_stop)
     moves = iter(range(1, 1 << 30))
 

@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 
+from ..bake.bake_job import BakeJob
 from ..bake.job import run_bake
 from ..core.settings import BakeSettings
 from ..gpu_shaders.context import ensure_context
@@ -76,5 +77,5 @@ def settings_in_turn(request: dict, reporter, should_stop) -> None:
 def _timed(snapshot, grid, settings, reporter, should_stop):
     """(seconds, result) of one bake. Reading the field back waits for the GPU."""
     started = time.perf_counter()
-    result = run_bake(snapshot, grid, settings, reporter, should_stop)
+    result = run_bake(BakeJob(snapshot, grid, settings), reporter, should_stop)
     return time.perf_counter() - started, result

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ..bake.bake_job import BakeJob
 from ..bake.result import BakeResult
 from ..core import lookup
 from ..core import spherical_harmonics as sh
@@ -112,7 +113,7 @@ def _bake_once(scene, name: str, settings: BakeSettings, run: str, reporter, sho
         reporter.phase(f"read ({run})")
         snapshot = read_scene(scene)
     grid = bench_scenes.grid_of(name, snapshot)
-    result = pipeline.bake_volumes(snapshot, [grid], settings, reporter, should_stop, stopwatch)[0]
+    result = pipeline.bake_volumes([BakeJob(snapshot, grid, settings)], reporter, should_stop, stopwatch)[0]
     seconds = stopwatch.totals()
     row = {
         "run": run,

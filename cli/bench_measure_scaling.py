@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 
+from ..bake.bake_job import BakeJob
 from ..bake.capture_choice import device_cost
 from ..bake.job import drive
 from ..bake.session import BakeSession
@@ -138,7 +139,7 @@ class _Bakes:
         clock = PhaseClock()
         bvh.forget()
         started = time.perf_counter()
-        session = BakeSession(self._snapshot, grid, settings, clock, stopwatch=clock)
+        session = BakeSession(BakeJob(self._snapshot, grid, settings), clock, stopwatch=clock)
         drive(session.bake(), self._should_stop)
         result = session.result
         seconds = time.perf_counter() - started

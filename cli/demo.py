@@ -27,6 +27,7 @@ def check(args) -> None:
 def run(args, reporter, should_stop):
     import bpy
 
+    from ..bake.bake_job import BakeJob
     from ..scene.gallery import build_gallery
     from ..scene.probe_objects import place_probes
     from ..scene.read import read_scene
@@ -46,9 +47,8 @@ def run(args, reporter, should_stop):
         pipeline.check_snapshot(snapshot, reporter)
         grids = [Grid(volume.matrix, volume.resolution, volume.name) for volume in snapshot.volumes]
         pipeline.start_gpu(reporter, stopwatch)
-        results = pipeline.bake_volumes(
-            snapshot, grids, settings, reporter, should_stop, stopwatch, goal=bake.goal_from(args)
-        )
+        jobs = [BakeJob(snapshot, grid, settings) for grid in grids]
+        results = pipeline.bake_volumes(jobs, reporter, should_stop, stopwatch, bake.goal_from(args))
         with stopwatch("write"):
             for volume, result in zip(snapshot.volumes, results):
                 place_probes(scene, result.field.grid, result.field.state, bpy.data.objects.get(volume.name))

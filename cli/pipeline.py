@@ -7,14 +7,13 @@ from pathlib import Path
 
 import bpy
 
+from ..bake.bake_job import BakeJob
 from ..bake.block_session import AnySession, open_session
 from ..bake.error_driven import ErrorDrivenBake
 from ..bake.job import drive
 from ..bake.preview import write_previews
 from ..bake.result import BakeResult, check_surfaces, report_on
 from ..core.error_budget import ErrorGoal
-from ..core.grid import Grid
-from ..core.probe_edits import ProbeEdits
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..formats import probe_file, probe_metadata
@@ -41,34 +40,31 @@ def check_snapshot(snapshot: SceneSnapshot, reporter) -> None:
 
 
 def bake_volumes(
-    snapshot: SceneSnapshot,
-    grids: list[Grid],
-    settings: BakeSettings,
+    jobs: list[BakeJob],
     reporter,
     should_stop,
     stopwatch: RunClock,
-    edits: list[ProbeEdits | None] | None = None,
-    kept: list[AnySession] | None = None,
     goal: ErrorGoal | None = None,
+    kept: list[AnySession] | None = None,
 ) -> list[BakeResult]:
-    """Bakes ``grids`` one after the other, each with its ``edits``, with ``settings`` or as the ``goal`` asks. Appends
-    the sessions to ``kept``, which keeps them on the GPU."""
-    for grid in grids:
-        probe_file.check_size(grid, settings.bands)
+    """Bakes ``jobs`` one after the other, with their settings or as the ``goal`` asks. Appends the sessions to
+    ``kept``, which keeps them on the GPU."""
+    for job in jobs:
+        probe_file.check_size(job.grid, job.settings.bands)
     results = []
-    for grid, edit in zip(grids, edits or [None] * len(grids)):
-        if len(grids) > 1:
-            reporter.note(f"volume '{grid.name}'")
+    for job in jobs:
+        if len(jobs) > 1:
+            reporter.note(f"volume '{job.grid.name}'")
         if goal is None:
-            session = open_session(snapshot, grid, settings, reporter, edit)
+            session = open_session(job, reporter)
             drive(session.bake(), should_stop)
         else:
-            driven = ErrorDrivenBake(snapshot, grid, settings, goal, reporter, edit)
+            driven = ErrorDrivenBake(job, goal, reporter)
             drive(driven.bake(), should_stop)
             session = driven.session
         result = session.result
         stopwatch.add(result.seconds)
-        report_on(result, grid, settings, reporter)
+        report_on(result, job.grid, job.settings, reporter)
         results.append(result)
         if kept is not None:
             kept.append(session)

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
+from ..bake.bake_job import BakeJob
 from ..bake.block_session import BlockGround
 from ..bake.capture_choice import choose_capture
 from ..bake.cull import cull
@@ -38,7 +39,7 @@ def calibrate(
     state = cull(snapshot, grid, settings, edits)
     capture = choose_capture(settings, scene.triangle_count, int((state != CULLED).sum()))[0]
     for most in _SIZES:
-        ground = BlockGround(snapshot, grid, replace(settings, block=most), edits, state, scene, capture)
+        ground = BlockGround(BakeJob(snapshot, grid, replace(settings, block=most), edits), state, scene, capture)
         block = max(ground.blocks, key=lambda block: len(ground.captured(block)))
         times = _bake(ground, block, should_stop)
         if most > _SIZES[0] or len(ground.blocks) == 1:

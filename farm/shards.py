@@ -11,6 +11,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..bake.bake_job import BakeJob
 from ..bake.block_session import BlockGround
 from ..bake.volume_bake import VolumeBake
 from ..core.emitters import sampling_density
@@ -133,7 +134,7 @@ class ShardRunner:
         grid, state, edits = volume_of(self.job, group)
         scene = SceneTextures(snapshot, grid.center, sampling_density(snapshot, grid))
         capture = self.job.plan["frames"][group[0]]["volumes"][group[1]]["capture"]
-        ground = BlockGround(snapshot, grid, self.settings, edits, state, scene, capture)
+        ground = BlockGround(BakeJob(snapshot, grid, self.settings, edits), state, scene, capture)
         self._place = _Place(group, ground, {})
         return self._place
 

@@ -36,12 +36,12 @@ class Encoder:
         if self.clipped:
             found.append(
                 f"{self.clipped} values are beyond the range of half floats and were cut at {LARGEST_HALF:.0f}; "
-                "use --precision float or a --gain below 1"
+                "use a gain below 1 (--gain), or floats (--precision float)"
             )
         if self.precision == "half" and 0 < self.peak < DIM:
             found.append(
-                f"the light is dim (at most {self.peak:.2g}), half floats keep few digits of it; use --precision float "
-                "or a --gain above 1"
+                f"the light is dim (at most {self.peak:.2g}), half floats keep few digits of it; use a gain above 1 "
+                "(--gain), or floats (--precision float)"
             )
         return found
 

@@ -36,7 +36,7 @@ class StagedFolder:
         except OSError as error:
             self._discard()
             reason = error.strerror
-            raise InputError(f"cannot write to the folder {self.folder}: {reason}; name another with -o") from None
+            raise InputError(f"cannot write to the folder {self.folder}: {reason}; name another one") from None
         return self
 
     def __exit__(self, kind, error, _trace):

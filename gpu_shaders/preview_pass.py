@@ -23,7 +23,7 @@ from .world_light import world_texture
 _MOST_SPHERES = 2048  # per picture, nearest to the camera first
 _SPHERE_SHARE = 0.08  # of a cell's shortest edge
 _HIDDEN = 0.5  # of the radius, of spheres of probes that hold no light; as preview_comp.glsl has it
-_EVEN = 12 / 255  # most difference between neighbours, as shown, that one sample of each may leave
+_EVEN = 5 / 255  # most difference between neighbours, as shown, that one sample of each may leave
 
 
 class PreviewPass:

@@ -12,6 +12,7 @@ from collections.abc import Generator, Iterator
 
 import bpy
 
+from ..bake.bake_job import BakeJob
 from ..bake.result import BakeResult
 from ..core.error_budget import ErrorGoal
 from ..core.errors import Cancelled, InputError
@@ -165,7 +166,7 @@ class BakeTask:
             yield from kept.session.relight(snapshot)
             return kept
         del kept
-        fresh = KeptBake(grid, self.settings, edits, self.progress, snapshot, self._goal)
+        fresh = KeptBake(BakeJob(snapshot, grid, self.settings, edits), self.progress, self._goal)
         yield from fresh.bake()
         return fresh
 

@@ -14,6 +14,7 @@ from ..formats import probe_file
 from ..scene.field_storage import store_field
 from ..scene.volumes import create_volume
 from . import names
+from .volume_choice import in_object_mode
 
 
 class GRIDLIGHT_OT_import_field(bpy.types.Operator):
@@ -28,10 +29,7 @@ class GRIDLIGHT_OT_import_field(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Probe files come in in Object Mode")
-            return False
-        return True
+        return in_object_mode(cls, context)
 
     def invoke(self, context, _event):
         context.window_manager.fileselect_add(self)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import bpy
 from bpy.app.handlers import persistent
 
+from ..bake.bake_job import BakeJob
 from ..bake.block_session import open_session
 from ..bake.error_driven import ErrorDrivenBake
 from ..bake.result import Reporter
@@ -16,7 +17,6 @@ from ..core.error_budget import ErrorGoal
 from ..core.grid import Grid
 from ..core.probe_edits import ProbeEdits
 from ..core.settings import BakeSettings
-from ..core.snapshot import SceneSnapshot
 from ..core.steps import STEP_SECONDS, Pace, Steps
 from ..gpu_shaders.textures import wait_for_gpu
 from ..scene.probe_objects import read_edits
@@ -45,20 +45,12 @@ class Relay:
 class KeptBake:
     """A session with what must still hold for it to be relit."""
 
-    def __init__(
-        self,
-        grid: Grid,
-        settings: BakeSettings,
-        edits: ProbeEdits | None,
-        reporter: Reporter,
-        snapshot: SceneSnapshot,
-        goal: ErrorGoal | None = None,
-    ):
+    def __init__(self, job: BakeJob, reporter: Reporter, goal: ErrorGoal | None = None):
         self.relay = Relay(reporter)
         pace = Pace(STEP_SECONDS, wait_for_gpu)
-        self.session = open_session(snapshot, grid, settings, self.relay, edits, pace=pace)
-        self._driven = ErrorDrivenBake(snapshot, grid, settings, goal, self.relay, edits, pace=pace) if goal else None
-        self._grid, self._settings, self._edits = grid, settings, edits or ProbeEdits.none(grid)
+        self.session = open_session(job, self.relay, pace=pace)
+        self._driven = ErrorDrivenBake(job, goal, self.relay, pace=pace) if goal else None
+        self._grid, self._settings, self._edits = job.grid, job.settings, job.probe_edits  # not the whole old scene
 
     def bake(self) -> Steps[None]:
         """The bake in steps; ``session`` has it afterwards."""

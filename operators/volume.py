@@ -139,6 +139,8 @@ def _snapshot(context, fit: str, apart_from: bpy.types.Object | None = None) -> 
     """
     snapshot = read_scene(context.scene, context.view_layer, live=True)
     if fit == "SCENE":
+        if not len(snapshot.triangles):
+            raise InputError("nothing in the scene has a surface that renders show; add a mesh first")
         return snapshot
     chosen = {item.name for item in context.selected_objects if item not in {apart_from, *volumes_of(context.scene)}}
     # Instances are called "owner > instance".

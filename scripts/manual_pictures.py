@@ -31,6 +31,7 @@ def load_package() -> None:
 
 load_package()
 
+from gridlight.bake.bake_job import BakeJob  # noqa: E402
 from gridlight.bake.job import run_bake  # noqa: E402  (the package has just been loaded)
 from gridlight.bake.result import Silent  # noqa: E402
 from gridlight.core import camera, lookup, ringing  # noqa: E402
@@ -98,7 +99,7 @@ def snapshot() -> SceneSnapshot:
 
 def bake(scene: SceneSnapshot, low, high, resolution, **settings) -> Field:
     grid = Grid.from_bounds(low, high, resolution)
-    return run_bake(scene, grid, BakeSettings(**settings), Silent(), lambda: False).field
+    return run_bake(BakeJob(scene, grid, BakeSettings(**settings)), Silent(), lambda: False).field
 
 
 def straight(field: Field) -> Field:

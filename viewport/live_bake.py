@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..bake.bake_job import BakeJob
 from ..bake.block_session import AnySession, open_session
 from ..bake.result import Silent
 from ..core.errors import GridlightError
@@ -160,9 +161,8 @@ class LiveBake:
             kept = before.pop(target.grid.name, None)
             if kept is None or kept.session.settings != wanted.settings or not kept.target.equals(target):
                 del kept
-                session = open_session(
-                    wanted.snapshot, target.grid, wanted.settings, Silent(), target.edits, pace=self._pace
-                )
+                job = BakeJob(wanted.snapshot, target.grid, wanted.settings, target.edits)
+                session = open_session(job, Silent(), pace=self._pace)
                 for _ in session.bake():
                     yield Progress()
                 moments = np.full(len(session.unshown), wanted.moment)

@@ -3,6 +3,7 @@
 
 import bpy
 import numpy as np
+from gridlight.bake.bake_job import BakeJob
 from gridlight.core import lookup
 from gridlight.core.grid import Grid
 from gridlight.core.settings import BakeSettings
@@ -17,7 +18,7 @@ def run(snapshot, grid, **settings):
     from gridlight.cli.progress import Reporter
 
     settings = {"face": 8, **settings}
-    return run_bake(snapshot, grid, BakeSettings(**settings), Reporter(quiet=True), lambda: False)
+    return run_bake(BakeJob(snapshot, grid, BakeSettings(**settings)), Reporter(quiet=True), lambda: False)
 
 
 def irradiance(result, points):

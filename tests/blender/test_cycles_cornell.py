@@ -5,6 +5,7 @@ settings."""
 import bpy
 import numpy as np
 import pytest
+from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.job import run_bake
 from gridlight.cli.progress import Reporter
 from gridlight.cli.verify_points import SIX_NORMALS, FreeSpace
@@ -29,7 +30,7 @@ NODES = 20
 def bake(scene, grid):
     from gridlight.scene.read import read_scene
 
-    result = run_bake(read_scene(scene), grid, BakeSettings(), Reporter(quiet=True), lambda: False)
+    result = run_bake(BakeJob(read_scene(scene), grid, BakeSettings()), Reporter(quiet=True), lambda: False)
     assert result.converged
     return result.field
 

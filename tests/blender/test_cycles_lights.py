@@ -11,6 +11,7 @@ of all coefficients of four bands, and of the mean radiance (band 0) alone.
 import bpy
 import numpy as np
 import pytest
+from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.job import run_bake
 from gridlight.cli.progress import Reporter
 from gridlight.core import measures
@@ -146,7 +147,7 @@ def probe_and_reference(scene, samples):
     from gridlight.scene.read import read_scene
 
     grid = Grid.from_bounds(PROBE - 0.5, PROBE + 0.5, (1, 1, 1))
-    result = run_bake(read_scene(scene), grid, SETTINGS, Reporter(quiet=True), lambda: False)
+    result = run_bake(BakeJob(read_scene(scene), grid, SETTINGS), Reporter(quiet=True), lambda: False)
     references = [
         project_panorama(render_panoramas(scene, PROBE, 256, 128, samples, seed, bounces=0)[0], 4) for seed in (1, 2)
     ]

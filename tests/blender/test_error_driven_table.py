@@ -10,6 +10,7 @@ import time
 import bpy
 import numpy as np
 import pytest
+from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.error_driven import ErrorDrivenBake
 from gridlight.bake.result import Silent
 from gridlight.bake.session import BakeSession
@@ -144,15 +145,16 @@ def table_of(name, folder):
     were given up leave."""
     scene, grid = SCENES[name]()
     snapshot = read_scene(scene)
-    first, _ = timed(BakeSession(snapshot, grid, BakeSettings(face=6), Silent()))  # also compiles shaders
+    first, _ = timed(BakeSession(BakeJob(snapshot, grid, BakeSettings(face=6)), Silent()))  # also compiles shaders
     judge = Judge(scene, snapshot, grid, first.field)
     by_hand = []
     for face, samples in BY_HAND:
-        result, seconds = timed(BakeSession(snapshot, grid, BakeSettings(face=face, samples=samples), Silent()))
+        job = BakeJob(snapshot, grid, BakeSettings(face=face, samples=samples))
+        result, seconds = timed(BakeSession(job, Silent()))
         by_hand.append((judge(result.field), seconds))
     rows = []
     for target in TARGETS:
-        bake = ErrorDrivenBake(snapshot, grid, BakeSettings(), ErrorGoal(target), Silent())
+        bake = ErrorDrivenBake(BakeJob(snapshot, grid, BakeSettings()), ErrorGoal(target), Silent())
         result, seconds = timed(bake)
         cheapest = min((cost for error, cost in by_hand if error <= target), default=None)
         share = bytes_of(result.field, folder) / bytes_of(bake.whole, folder)

@@ -110,7 +110,9 @@ def test_operators_say_what_is_missing(scene):
     assert not bpy.ops.gridlight.export.poll()
     with pytest.raises(RuntimeError, match="nothing with a surface"):
         bpy.ops.gridlight.add_volume(fit="SELECTION")
-    with pytest.raises(RuntimeError, match="no surface"):
+    with pytest.raises(
+        RuntimeError, match=r"nothing in the scene has a surface that renders show; add a mesh first\s*$"
+    ):
         bpy.ops.gridlight.add_volume()
 
 
@@ -242,6 +244,9 @@ def test_export_writes_what_is_stored(room, gpu_context, tmp_path, target):
 
         written = probe_file.read(tmp_path / "out" / "probes.exr")
         assert np.array_equal(written.coefficients, load_field(room).coefficients)
+        settings.directory = str(tmp_path / "out" / "probes.exr" / "deeper")
+        with pytest.raises(RuntimeError, match=r"cannot write to the folder .*; name another one\s*$"):
+            bpy.ops.gridlight.export()
 
 
 def test_report_of_what_is_stored(room, gpu_context):

@@ -7,6 +7,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 import pytest
+from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.session import BakeSession
 from gridlight.cli.progress import Reporter
 from gridlight.core.grid import Grid
@@ -62,7 +63,7 @@ def test_relighting_the_gallery(gpu_context):
     volume = snapshot.volumes[0]
     grid, settings = Grid(volume.matrix, volume.resolution, volume.name), BakeSettings()
     for _warm in range(2):
-        session = BakeSession(snapshot, grid, settings, Reporter(quiet=True))
+        session = BakeSession(BakeJob(snapshot, grid, settings), Reporter(quiet=True))
         whole, longest = timed(session.bake())
     print(f"\nbake {whole:.2f} s, longest step {longest:.2f}")
     for name, (change, most) in CHANGES.items():

@@ -4,6 +4,7 @@
 from dataclasses import replace
 
 import numpy as np
+from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.job import run_bake
 from gridlight.core import lookup
 from gridlight.core.light_profiles import DISTANCES_M, HEIGHT, WIDTH, LightProfile
@@ -27,7 +28,7 @@ class Silent:
 
 
 def bake(snapshot, grid, settings):
-    return run_bake(snapshot, grid, settings, Silent(), lambda: False)
+    return run_bake(BakeJob(snapshot, grid, settings), Silent(), lambda: False)
 
 
 def irradiance_at_nodes(field, normals=AXES):

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.session import BakeSession
 from gridlight.core.cubemap import unpack_normal
 from gridlight.core.grid import Grid
@@ -360,7 +361,8 @@ def test_what_only_buried_probes_see_does_not_hold_up_the_rest():
     materials = [Material("grey", (0.5,) * 3), Material("white", (1.0,) * 3)]
     lamp = Light("lamp", "POINT", (5.0,) * 3, frame((0.1, 0.2, 2.5)))
     snapshot = snapshot_of(corners, objects, materials, objects, lights=[lamp])
-    session = BakeSession(snapshot, Grid.from_bounds([-2.5] * 3, [2.5] * 3, (9, 9, 9)), BakeSettings(face=8), Silent())
+    job = BakeJob(snapshot, Grid.from_bounds([-2.5] * 3, [2.5] * 3, (9, 9, 9)), BakeSettings(face=8))
+    session = BakeSession(job, Silent())
     run(session.bake())
     assert session.result.counts["invalid"] > 0 and session.result.converged
     patches = session.backend.light.patches

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.block_session import open_session
 from gridlight.core.blocks import cut
 from gridlight.core.conventions import ACTIVE, INVALID
@@ -39,7 +40,7 @@ def test_the_memory_budget_changes_no_byte():
     settings = BakeSettings(face=32, block=20, keep_all=True, capture="trace")
     results = []
     for memory_mib in (512, 16):
-        session = open_session(snapshot, grid, replace(settings, memory_mib=memory_mib), Silent())
+        session = open_session(BakeJob(snapshot, grid, replace(settings, memory_mib=memory_mib)), Silent())
         for _ in session.bake():
             assert len(session.open_blocks) <= (1 if memory_mib == 16 else len(cut(grid, 20)))
         results.append(session.result)

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.error_driven import ErrorDrivenBake
 from gridlight.bake.session import BakeSession
 from gridlight.core import patches
@@ -89,7 +90,8 @@ def test_paths_see_an_emitter_sampled_or_not(sampled):
 
 
 def driven(snapshot, target, kept=(), **settings):
-    bake = ErrorDrivenBake(snapshot, GRID, BakeSettings(**settings), ErrorGoal(target, frozenset(kept)), Silent())
+    job = BakeJob(snapshot, GRID, BakeSettings(**settings))
+    bake = ErrorDrivenBake(job, ErrorGoal(target, frozenset(kept)), Silent())
     for _ in bake.bake():
         pass
     return bake.result
@@ -103,7 +105,7 @@ def room():
 def test_the_predicted_error_is_that_against_a_fine_bake():
     """The reference is a bake too, but of 16 times the texels and 8 times the samples; paths have no part in it."""
     result = driven(room(), 0.04, kept=["bands"])
-    fine = BakeSession(room(), GRID, BakeSettings(face=32, samples=8, seed=99), Silent())
+    fine = BakeSession(BakeJob(room(), GRID, BakeSettings(face=32, samples=8, seed=99)), Silent())
     for _ in fine.bake():
         pass
     active = result.field.state == 1
@@ -129,15 +131,15 @@ def test_more_passes_make_it_better_and_go_where_they_are_needed(monkeypatch):
     monkeypatch.setattr(patches, "_MANY", 1)  # no more rays than asked for, so that noise is what is wrong
     grid = Grid.from_bounds((-0.7, -0.7, -0.6), (0.7, 0.7, 0.7), (4, 4, 4))
     bake = ErrorDrivenBake(
-        room(), grid, BakeSettings(face=12), ErrorGoal(0.012, frozenset({"face", "bands"})), Silent()
+        BakeJob(room(), grid, BakeSettings(face=12)), ErrorGoal(0.012, frozenset({"face", "bands"})), Silent()
     )
     for _ in bake.bake():
         pass
     passes = [int(told.split()[-2]) for told in bake.result.error["passes"]]
     assert len(passes) > 1 and passes[0] == passes[1] == bake.result.counts["active"] and passes[-1] <= passes[0]
-    once = BakeSession(room(), grid, bake.result.settings, Silent())
+    once = BakeSession(BakeJob(room(), grid, bake.result.settings), Silent())
     once.settings = replace(once.settings, samples=1)
-    fine = BakeSession(room(), grid, BakeSettings(face=32, samples=32, seed=99), Silent())
+    fine = BakeSession(BakeJob(room(), grid, BakeSettings(face=32, samples=32, seed=99)), Silent())
     for session in (once, fine):
         for _ in session.bake():
             pass

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.session import BakeSession
 from gridlight.core.conventions import ACTIVE
 from gridlight.core.gradients import per_cell
@@ -38,7 +39,7 @@ def shown_values(shown):
 @pytest.fixture(scope="module")
 def relit(gpu_context):
     """A bake, what was shown of it, and its light after a lamp has moved, which no field knows yet."""
-    session = BakeSession(ROOMS, WHERE, BakeSettings(**SETTINGS), Silent(), EDITS)
+    session = BakeSession(BakeJob(ROOMS, WHERE, BakeSettings(**SETTINGS), EDITS), Silent())
     run(session.bake())
     before = session.result.field
     run(session.relight(MOVED, live=True))
@@ -219,7 +220,7 @@ def test_other_changes_end_where_a_bake_does_too(relit, change):
         while live.is_working or live.is_rough:
             live.settle()
             views.frame(live, 1.0)
-    expected = BakeSession(change(ROOMS), WHERE, settings, Silent(), EDITS)
+    expected = BakeSession(BakeJob(change(ROOMS), WHERE, settings, EDITS), Silent())
     run(expected.bake())
     assert_same_bake(
         type("Result", (), {"field": views.shown.field, "counts": expected.result.counts}), expected.result

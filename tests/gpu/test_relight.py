@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.block_session import open_session
 from gridlight.bake.job import drive
 from gridlight.bake.session import BakeSession
@@ -66,7 +67,7 @@ def followed(steps):
 
 
 def session_of(snapshot, where=None, **settings):
-    session = BakeSession(snapshot, where or grid(), BakeSettings(**{**SETTINGS, **settings}), Silent())
+    session = BakeSession(BakeJob(snapshot, where or grid(), BakeSettings(**{**SETTINGS, **settings})), Silent())
     followed(session.bake())
     return session
 
@@ -271,7 +272,7 @@ def test_suns_of_the_world_come_move_and_go():
 def check_blocks(where, changes, captures, **settings):
     """Relights ``where`` in two blocks for one change after the other."""
     settings = BakeSettings(**{**SETTINGS, "block": where.count // 2, "bounces": 3, **settings})
-    session = open_session(rooms(), where, settings, Silent())
+    session = open_session(BakeJob(rooms(), where, settings), Silent())
     followed(session.bake())
     for new, captures_few in zip(changes, captures):
         followed(session.relight(new))

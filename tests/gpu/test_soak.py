@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.job import drive
 from gridlight.bake.session import BakeSession
 from gridlight.core.grid import Grid
@@ -31,13 +32,13 @@ def bake_one(number: int) -> None:
     snapshot = snapshot_of(corners, lights=[Light("lamp", "POINT", (2.0, 2.0, 2.0), frame(place), radius=0.05)])
     grid = Grid.from_bounds((-0.8, -0.8, -0.8), (0.8, 0.8, 0.8), (2, 2, 2 + number % 2))
     settings = BakeSettings(face=4, capture=("trace", "raster")[number % 3 == 0], gather=int(number % 5 == 0))
-    session = BakeSession(snapshot, grid, settings, Silent())
+    session = BakeSession(BakeJob(snapshot, grid, settings), Silent())
     drive(session.bake(), lambda: False)
     if number % 4 == 0:
         brighter = replace(snapshot.lights[0], color=(4.0, 3.0, 2.0))
         drive(session.relight(replace(snapshot, lights=[brighter])), lambda: False)
     if number % 6 == 0:  # one that is given up
-        steps = BakeSession(snapshot, grid, settings, Silent()).bake()
+        steps = BakeSession(BakeJob(snapshot, grid, settings), Silent()).bake()
         next(steps)
         steps.close()
 
