@@ -40,7 +40,12 @@ CHANGES = {
 }
 
 
-@pytest.mark.parametrize("name", CHANGES)
+QUICK = ("a lamp moved", "the world", "roughness")
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.nightly) for name in CHANGES]
+)
 def test_a_relight_with_gloss_is_a_fresh_bake(name):
     room = glossy_rooms()
     changed = CHANGES[name](room)
@@ -51,13 +56,14 @@ def test_a_relight_with_gloss_is_a_fresh_bake(name):
     assert session.result.relit.kept_places == (name not in ("roughness", "no gloss", "something moved"))
 
 
+@pytest.mark.nightly
 def test_a_bake_that_becomes_glossy():
     session = session_of(rooms(), grid(SMALL))
     followed(session.relight(glossy_rooms()))
     assert_same_bake(session.result, bake(glossy_rooms(), grid(SMALL), BakeSettings(**SETTINGS)))
 
 
-@pytest.mark.any_version
+@pytest.mark.nightly
 def test_texels_that_do_not_stay_give_the_same():
     """What is captured again mirrors the same."""
     room = glossy_rooms()
