@@ -13,6 +13,7 @@ import numpy as np
 
 from .conventions import LUMINANCE
 from .grid import Grid
+from .light_links import link_roles
 from .snapshot import SceneSnapshot
 
 CANDIDATES = 8  # points on emitters, of which a surface's shadow ray goes to one
@@ -27,7 +28,8 @@ def sampling_density(snapshot: SceneSnapshot, grid: Grid) -> np.ndarray:
     """(T,) probability density per m² with which a point on each triangle is chosen as a light sample; integrates to 1.
 
     Proportional to luminance of the emission; 0 everywhere where nothing is sampled. An object's emission is sampled
-    when the area that glows is no larger than the square of a cell's diagonal, or a small share of all surface.
+    when the area that glows is no larger than the square of a cell's diagonal, or a small share of all surface; and
+    where light linking lets it pass surfaces, at which rays at random end.
     """
     luminance = _luminance(snapshot)[snapshot.material_index]
     density = np.zeros(len(snapshot.triangles))
@@ -38,10 +40,11 @@ def sampling_density(snapshot: SceneSnapshot, grid: Grid) -> np.ndarray:
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
     per_object = np.bincount(snapshot.object_index[glowing], area[glowing], len(snapshot.object_names))
     most = max(float((grid.cell_size() ** 2).sum()), _SELDOM_SHARE * float(area.sum()))
+    passing = _passing(snapshot)[snapshot.material_index[glowing]]
     small = per_object[snapshot.object_index[glowing]] <= most
-    sampled = glowing[small & (area[glowing] > 0)]
-    if area[sampled].sum() > _MOST_AREA_SHARE * area.sum():
-        return density
+    if area[glowing[small]].sum() > _MOST_AREA_SHARE * area.sum():
+        small[:] = False
+    sampled = glowing[(small | passing) & (area[glowing] > 0)]
     power = area[sampled] * luminance[sampled]
     if power.sum() > 0:
         density[sampled] = luminance[sampled] / power.sum()
@@ -53,6 +56,12 @@ def reach(density: np.ndarray) -> float:
     this a direction finds an emitter at least as often as one of CANDIDATES points falls there. 0 without emitters."""
     sampled = density[density > 0]
     return float((np.pi * CANDIDATES * sampled.min()) ** -0.5) if len(sampled) else 0.0
+
+
+def _passing(snapshot: SceneSnapshot) -> np.ndarray:
+    """(M,) bool: there are surfaces that do not block the light of each material; at least one entry."""
+    roles = link_roles([material.links for material in snapshot.materials])
+    return ~roles.blocks.all(axis=0)[roles.group[roles.of_surface]]
 
 
 def _luminance(snapshot: SceneSnapshot) -> np.ndarray:

@@ -14,6 +14,7 @@ import numpy as np
 _LIT_SHARE = 0.02  # of the back faces seen: a spot lights little of a room, less than this is a leak of light
 _MOST = 0.5  # of the sphere
 _MOST_PAIRS = 1 << 22  # of probes and objects that are counted without sorting
+_FRONT_SHARE = 0.02  # of a probe's directions: less is no surface that anybody beside the probe could light
 _OPEN_SHARE = 0.01  # of a probe's directions that see background: the inside of a solid sees none
 
 
@@ -22,10 +23,14 @@ def inside_solid(shares: np.ndarray, light_elsewhere: bool = False) -> np.ndarra
     all back faces.
 
     Most of what such a probe sees are back faces of solids; or back faces of anything, and neither light nor the
-    world, which others do see, among these probes or elsewhere: where it is dark everywhere that tells nothing.
+    world, which others do see, among these probes or elsewhere: where it is dark everywhere that tells nothing. Behind
+    walls, in the void around a room under a black world, it is the same: back faces, background, and nothing that
+    light from there would fall on.
     """
     solid, background, lit, behind = shares.T
-    return (solid > _MOST) | ((behind > _MOST) & (background == 0) & (lit == 0) & (lit.any() or light_elsewhere))
+    dark = (lit == 0) & (lit.any() or light_elsewhere)
+    void = (behind > 0) & (1 - background - behind < _FRONT_SHARE)
+    return (solid > _MOST) | (dark & (void | ((behind > _MOST) & (background == 0))))
 
 
 class ShellVote:

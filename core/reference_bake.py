@@ -31,10 +31,11 @@ from .grid import Grid
 from .open_air import open_nodes
 from .orientation import ShellVote, inside_solid
 from .patches import gather_rays
-from .reference_light import ReferenceLight, off_surface
+from .reference_light import ReferenceLight
 from .reference_scene import ReferenceScene, Surfaces
 from .sampling import keys_of, sample_r2
 from .settings import BakeSettings
+from .sheets import off_surface
 from .snapshot import SceneSnapshot
 from .world_map import world_texels
 from .world_suns import PROBE_RAYS, extract_suns
@@ -88,9 +89,9 @@ class ReferenceBake:
         reflects = (surfaces.triangle >= 0) & surfaces.albedo.any(axis=2)
         hits[..., 3] = -1.0
         directions = np.broadcast_to(self.directions, self.points(surfaces).shape)[reflects]
-        sheets = self.texel_sheets(surfaces)[reflects]
+        both_sides = self.scene.sheet_shares[self.texel_sheets(surfaces)[reflects]].any(axis=1)
         hits[reflects, :3] = off_surface(
-            self.points(surfaces)[reflects], directions, surfaces.distance[reflects], sheets
+            self.points(surfaces)[reflects], directions, surfaces.distance[reflects], both_sides
         )
         hits[reflects, 3] = pack_normal(octahedral_encode(surfaces.normal[reflects]))
         return hits

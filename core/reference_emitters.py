@@ -29,6 +29,7 @@ class EmitterSamples:
     normal: np.ndarray  # (N, 3) unit
     radiance: np.ndarray  # (N, 3)
     density: np.ndarray  # (N,) per m²
+    group: np.ndarray  # (N,) of light linking
 
 
 @dataclass
@@ -37,6 +38,7 @@ class _Arrival:
 
     irradiance: np.ndarray  # (N, 3)
     point: np.ndarray  # (N, 3) on the emitter
+    group: np.ndarray  # (N,)
 
 
 @dataclass
@@ -75,26 +77,29 @@ class ReferenceEmitters:
         point = self.scene.triangles[triangle, 0] + np.einsum("ne,nei->ni", barycentric, self._edge[emitter])
         radiance = self.scene.emission(triangle, barycentric)
         radiance[self.scene.is_hole(triangle, barycentric)] = 0.0
-        return EmitterSamples(point, self._normal[emitter], radiance, self.density[triangle])
+        return EmitterSamples(point, self._normal[emitter], radiance, self.density[triangle], self._group(triangle))
+
+    def _group(self, triangle: np.ndarray) -> np.ndarray:
+        return self.scene.links.group[self.scene.role[triangle]]
 
     # At surfaces
     # ------------------------------------------------------------------------------------------------------------------
 
     def irradiance(
-        self, points: np.ndarray, origins: np.ndarray, normals: np.ndarray, keys: np.ndarray, index
+        self, points: np.ndarray, origins: np.ndarray, normals: np.ndarray, keys: np.ndarray, index, role: np.ndarray
     ) -> np.ndarray:
         """(N, 3) irradiance at ``points`` (N, 3) by sample ``index`` of the sequences of ``keys`` (N, 3): one point on
         the emitters and one direction about the normal, weighted by the balance heuristic. Rays start at ``origins``
-        (N, 3)."""
-        return self._by_points(points, origins, normals, keys, index) + self.by_directions(
-            origins, normals, keys, index
+        (N, 3), surfaces have ``role`` (N,) in light linking."""
+        return self._by_points(points, origins, normals, keys, index, role) + self.by_directions(
+            origins, normals, keys, index, role
         )
 
-    def unshadowed(self, points: np.ndarray, normals: np.ndarray, keys: np.ndarray, index) -> np.ndarray:
+    def unshadowed(self, points: np.ndarray, normals: np.ndarray, keys: np.ndarray, index, role) -> np.ndarray:
         """(N, 3) irradiance by candidate ``index`` of the sequences of ``keys`` (N, 3) if nothing stands between."""
-        return self._arrival(self.sample(sample_r3(keys, index).astype(float)), points, normals).irradiance
+        return self._arrival(self.sample(sample_r3(keys, index).astype(float)), points, normals, role).irradiance
 
-    def _arrival(self, emitter: EmitterSamples, points: np.ndarray, normals: np.ndarray) -> _Arrival:
+    def _arrival(self, emitter: EmitterSamples, points: np.ndarray, normals: np.ndarray, role: np.ndarray) -> _Arrival:
         """What points on the emitters answer for."""
         offset = emitter.point - points
         squared = np.maximum(np.einsum("ni,ni->n", offset, offset), 1e-20)
@@ -102,26 +107,29 @@ class ReferenceEmitters:
         direction = offset / distance[:, None]
         surface_cosine = np.maximum(np.einsum("ni,ni->n", direction, normals), 0.0)
         emitter_cosine = np.abs(np.einsum("ni,ni->n", direction, emitter.normal))
-        share = self._point_share(emitter.density, distance, surface_cosine, emitter_cosine)
+        share = self._point_share(emitter.group, emitter.density, distance, surface_cosine, emitter_cosine)
         factor = surface_cosine * emitter_cosine / (squared * emitter.density) * share
-        return _Arrival(emitter.radiance * factor[:, None], emitter.point)
+        factor = np.where(self.scene.falls_on(emitter.group, role), factor, 0.0)
+        return _Arrival(emitter.radiance * factor[:, None], emitter.point, emitter.group)
 
-    def _point_share(self, density, distance, surface_cosine, emitter_cosine) -> np.ndarray:
+    def _point_share(self, group, density, distance, surface_cosine, emitter_cosine) -> np.ndarray:
         """(N,) share of the light from an emitter that points on emitters answer for; directions about the normal
-        answer for the rest, within ``reach``."""
+        answer for the rest, within ``reach``. Not where light of the emitter's ``group`` passes any surface, at which
+        directions end."""
         points = CANDIDATES * density * distance * distance
         directions = surface_cosine * emitter_cosine / np.pi
-        return np.where(distance >= self.reach, 1.0, points / np.maximum(points + directions, 1e-300))
+        alone = (distance >= self.reach) | ~self.scene.links.blocks.all(axis=0)[group]
+        return np.where(alone, 1.0, points / np.maximum(points + directions, 1e-300))
 
-    def _by_points(self, points, origins, normals, keys, index) -> np.ndarray:
+    def _by_points(self, points, origins, normals, keys, index, role) -> np.ndarray:
         """Resampled: CANDIDATES points by power, one of them by what it would send if nothing stood between; a single
         number chooses among them one after the other."""
         choice = sample_r3(shifted(keys, _CHOICE_STREAM, 0, 0), index)[:, 0].astype(float)
-        best = _Arrival(np.zeros_like(points), np.zeros_like(points))
+        best = _Arrival(np.zeros_like(points), np.zeros_like(points), np.zeros(len(points), int))
         best_weight, total = np.zeros(len(points)), np.zeros(len(points))
         for candidate in range(CANDIDATES):
             u = sample_r3(keys, np.asarray(index) * CANDIDATES + candidate).astype(float)
-            arrival = self._arrival(self.sample(u), points, normals)
+            arrival = self._arrival(self.sample(u), points, normals, role)
             weight = arrival.irradiance.sum(axis=1)
             total += weight
             taken = (weight > 0) & (choice * total < weight)
@@ -129,19 +137,24 @@ class ReferenceEmitters:
             choice[taken] *= total[taken] / weight[taken]
             choice[left] = (choice[left] * total[left] - weight[left]) / (total[left] - weight[left])
             best_weight[taken] = weight[taken]
-            for name in ("irradiance", "point"):
+            for name in ("irradiance", "point", "group"):
                 getattr(best, name)[taken] = getattr(arrival, name)[taken]
         lit = np.flatnonzero(best_weight > 0)
         # From where the ray starts, which is not the surface: to an emitter a few centimetres away it would be too long
         # and meet the emitter itself.
         way = best.point[lit] - origins[lit]
         length = np.maximum(np.linalg.norm(way, axis=1), 1e-20)
-        lit = lit[self.scene.visible(origins[lit], way / length[:, None], length * _SHADOW_END)]
+        visible = np.zeros(len(lit), bool)
+        for group in np.unique(best.group[lit]):
+            mine = best.group[lit] == group
+            ends = length[mine] * _SHADOW_END
+            visible[mine] = self.scene.visible(origins[lit[mine]], way[mine] / length[mine, None], ends, group)
+        lit = lit[visible]
         result = np.zeros_like(points)
         result[lit] = best.irradiance[lit] * (total[lit] / (best_weight[lit] * CANDIDATES))[:, None]
         return result
 
-    def by_directions(self, origins: np.ndarray, normals: np.ndarray, keys: np.ndarray, index) -> np.ndarray:
+    def by_directions(self, origins: np.ndarray, normals: np.ndarray, keys: np.ndarray, index, role) -> np.ndarray:
         """(N, 3) irradiance by one direction about each of ``normals`` (N, 3), which finds emitters within
         ``reach``."""
         u = sample_r2(shifted(keys, 0, _DIRECTION_STREAM, 0), index).astype(float)
@@ -149,11 +162,13 @@ class ReferenceEmitters:
         hits = self.scene.closest(origins, direction)
         found = np.flatnonzero((hits.triangle >= 0) & (hits.distance < self.reach))
         found = found[self.density[hits.triangle[found]] > 0]
+        found = found[self.scene.falls_on(self._group(hits.triangle[found]), role[found])]
         triangle, direction = hits.triangle[found], direction[found]
         edge = self.scene.triangles[triangle, 1:] - self.scene.triangles[triangle, :1]
         normal = np.cross(edge[:, 0], edge[:, 1])
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         share = self._point_share(
+            self._group(triangle),
             self.density[triangle],
             hits.distance[found],
             np.einsum("ni,ni->n", direction, normals[found]),

@@ -12,6 +12,7 @@ packed normal.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -33,11 +34,12 @@ from .patches import (
     effort,
     light_parts,
 )
-from .rays import leave_surface, pull_back, step_off
+from .rays import leave_surface, step_off
 from .reference_emitters import ReferenceEmitters
 from .reference_scene import ReferenceScene
 from .sampling import keys_of, light_keys, pcg3d, sample_cosine, sample_r2, shifted
 from .settings import BakeSettings
+from .sheets import off_surface, side_weight
 from .snapshot import Light
 from .world_map import world_texels
 from .world_suns import extract_suns
@@ -146,21 +148,23 @@ class ReferenceLight:
         count = points.shape[1] // 2
         luminance = np.zeros((count, len(numbers)))
         candidate_variance = np.zeros(len(numbers))
+        roles = self._roles(numbers, sheets)
         for index in range(count):
             point, normal = _split(points[numbers, 2 * index])
             for side, normals, side_keys, share in self._sides(normal, keys, numbers, sheets):
-                weight = share @ LUMINANCE
+                weight, role = share @ LUMINANCE, roles[side]
                 if part == EMITTERS:
                     one, other = (
-                        self.emitters.unshadowed(point[side], normals, side_keys, number) @ LUMINANCE * weight
+                        self.emitters.unshadowed(point[side], normals, side_keys, number, role) @ LUMINANCE * weight
                         for number in (2 * index, 2 * index + 1)
                     )
                     start = leave_surface(point[side], normals)
-                    near = self.emitters.by_directions(start, normals, side_keys, index) @ LUMINANCE
+                    near = self.emitters.by_directions(start, normals, side_keys, index, role) @ LUMINANCE
                     luminance[index, side] += (one + other) / 2 + near * weight
                     candidate_variance[side] += (one - other) ** 2 / 2 / count
                 else:
-                    lamps = self._lamps(point[side], point[side], normals, side_keys, index, shadows=False, part=part)
+                    at = point[side]
+                    lamps = self._lamps(at, at, normals, side_keys, index, role, shadows=False, part=part)
                     luminance[index, side] += lamps @ LUMINANCE * weight
         variance = np.maximum(luminance.var(axis=0) - candidate_variance / 2, 0.0) + candidate_variance / CANDIDATES
         return luminance.mean(axis=0), np.sqrt(variance)
@@ -180,6 +184,7 @@ class ReferenceLight:
         total = np.zeros((len(numbers), 3))
         each = points.shape[1]
         shift = (pcg3d(shifted(keys, 0, _PLACE_STREAM, 0))[:, 0] % each).astype(int)
+        roles = self._roles(numbers, sheets)
         for index in range(samples):
             place = (index * each + shift) // samples if samples < each else index % each
             point, normal = _split(points[numbers, place])
@@ -187,7 +192,7 @@ class ReferenceLight:
                 emitter_keys = shifted(side_keys, 0, 0, _EMITTER_STREAM)
                 origin = leave_surface(point[side], normals)
                 total[side] += share * self._irradiance(
-                    point[side], origin, normals, side_keys, emitter_keys, index, part
+                    point[side], origin, normals, side_keys, emitter_keys, index, roles[side], part
                 )
         return total / samples
 
@@ -202,26 +207,32 @@ class ReferenceLight:
         back = np.flatnonzero(through.any(axis=1))
         yield back, -normal[back], shifted(keys[back], 0, _BACK_STREAM, 0), through[back]
 
+    def _roles(self, numbers: np.ndarray, sheets: np.ndarray | None) -> np.ndarray:
+        """(C,) roles of the patches ``numbers`` (C,) in light linking."""
+        return np.zeros(len(numbers), int) if sheets is None else self.scene.sheet_roles[sheets[numbers]]
+
     def _all_lamps(self) -> list[Light]:
         """Lamps and suns of the world."""
         return [*self.scene.snapshot.lights, *self._suns]
 
-    def _irradiance(self, point, origin, normal, lamp_keys, emitter_keys, index, part: Part = ALL) -> np.ndarray:
+    def _irradiance(self, point, origin, normal, lamp_keys, emitter_keys, index, role, part: Part = ALL) -> np.ndarray:
         irradiance = np.zeros_like(point)
         if part != EMITTERS:
-            irradiance += self._lamps(point, origin, normal, lamp_keys, index, part=part)
+            irradiance += self._lamps(point, origin, normal, lamp_keys, index, role, part=part)
         if self.emitters.count and part in (EMITTERS, ALL):
-            irradiance += self.emitters.irradiance(point, origin, normal, emitter_keys, index)
+            irradiance += self.emitters.irradiance(point, origin, normal, emitter_keys, index, role)
         return irradiance
 
-    def _lamps(self, point, origin, normal, keys, index, shadows: bool = True, part: Part = ALL) -> np.ndarray:
-        """(C, 3) irradiance of lamps and suns of the world by sample ``index`` of the sequences of ``keys`` (C, 3)."""
+    def _lamps(self, point, origin, normal, keys, index, role, shadows: bool = True, part: Part = ALL) -> np.ndarray:
+        """(C, 3) irradiance of lamps and suns of the world by sample ``index`` of the sequences of ``keys`` (C, 3), on
+        surfaces of ``role`` (C,)."""
         total = np.zeros_like(point)
-        visible = self.scene.visible if shadows else lambda origins, directions, limits: np.ones(len(origins), bool)
         first, stop = part if isinstance(part, tuple) else (0, None)
         for number, light in list(enumerate(self._all_lamps()))[first:stop]:
             u = sample_r2(light_keys(keys, number), index).astype(float)
-            total += direct_light.irradiance(light, point + self.scene.origin, origin, normal, u, visible)
+            visible = partial(self.scene.visible, group=light.link_group) if shadows else _always
+            light_there = direct_light.irradiance(light, point + self.scene.origin, origin, normal, u, visible)
+            total += np.where(self.scene.falls_on(light.link_group, role)[:, None], light_there, 0.0)
         return total
 
     # Rays
@@ -248,7 +259,8 @@ class ReferenceLight:
         origin = leave_surface(point, normal)
         keys = keys_of(first_key + patch, _RAY_STREAM, self.settings.seed)
         hits, end_sheets = np.zeros((len(patch), 4)), np.zeros(len(patch), np.int64)
-        carried, reflected = np.zeros((len(patch), 3)), _side_weight(through, crosses)
+        role = self._roles(patch, sheets)
+        carried, reflected = np.zeros((len(patch), 3)), side_weight(through, crosses)
         reflected[at[:, 3] < 0] = 0.0
         for segment in range(segments):
             alive = np.flatnonzero(reflected.any(axis=1))
@@ -259,14 +271,17 @@ class ReferenceLight:
             missed = found.triangle < 0
             face, row, column = direction_to_texel(direction, self.settings.face)
             background = self._world[(face * self.settings.face + row) * self.settings.face + column]
-            sampled = ~missed & (self.emitters.density[found.triangle] > 0)
-            seen = np.where(missed[:, None], background, np.where(sampled[:, None], 0.0, surface.emission))
+            unlit = ~self.scene.falls_on(self.scene.links.group[self.scene.role[found.triangle]], role[alive])
+            dark = ~missed & (unlit | (self.emitters.density[found.triangle] > 0))
+            seen = np.where(missed[:, None], background, np.where(dark[:, None], 0.0, surface.emission))
+            role[alive] = self.scene.role[found.triangle]
             carried[alive] += reflected[alive] * seen
             reflected[alive] *= surface.albedo  # zero where a ray missed
             position = origin[alive] + direction * np.where(missed, 0.0, found.distance)[:, None]
             sheet = np.where(missed, 0, self.scene.sheet[found.triangle])
             end_sheets[alive] = sheet
-            hits[alive, :3] = off_surface(position, direction, np.where(missed, 0.0, found.distance), sheet)
+            both_sides = self.scene.sheet_shares[sheet].any(axis=1)
+            hits[alive, :3] = off_surface(position, direction, np.where(missed, 0.0, found.distance), both_sides)
             hits[alive, 3] = _pack(surface.normal, ~missed)
             if segment < segments - 1:
                 on = reflected[alive].any(axis=1)
@@ -279,13 +294,13 @@ class ReferenceLight:
                         position[on][side], normals, towards * direction[on][side], found.distance[on][side]
                     )
                     arriving[side] += share * self._irradiance(
-                        position[on][side], start, normals, side_keys, side_keys, index[alive][side]
+                        position[on][side], start, normals, side_keys, side_keys, index[alive][side], role[alive][side]
                     )
                 carried[alive] += reflected[alive] * arriving / np.pi
                 through = self.scene.sheet_shares[sheet[on]]
                 side = pcg3d(shifted(keys[alive], 0, _SIDE_STREAM + segment, 0) + _number(index[alive]))[:, 0]
                 crosses = through.any(axis=1) & (side % 2 == 1)
-                reflected[alive] *= _side_weight(through, crosses)
+                reflected[alive] *= side_weight(through, crosses)
                 turn = np.where(crosses, -1.0, 1.0)[:, None]
                 normal[alive] = turn * facing
                 origin[alive] = step_off(position[on], normal[alive], -turn * direction[on], found.distance[on])
@@ -360,23 +375,14 @@ def bounce(
     return direct + brought + coming.sum(axis=1) / counted[:, None]
 
 
+def _always(origins: np.ndarray, _directions: np.ndarray, _limits: np.ndarray) -> np.ndarray:
+    return np.ones(len(origins), bool)
+
+
 def _split(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions and normals (C, 3 each) of places (C, 4), float64."""
     at = at.astype(float)
     return at[:, :3], unpack_normal(np.maximum(at[:, 3], 0.0))
-
-
-def off_surface(points: np.ndarray, directions: np.ndarray, distances: np.ndarray, sheets: np.ndarray) -> np.ndarray:
-    """Hit ``points`` (H, 3) as patches keep them: pulled back along their rays, but on the surface itself where that is
-    a sheet (H,), which rays leave on both sides."""
-    return np.where((sheets > 0)[:, None], points, pull_back(points, directions, distances))
-
-
-def _side_weight(through: np.ndarray, crosses: np.ndarray) -> np.ndarray:
-    """(C, 3) weight of rays of which half go on from the back of their sheet, those that cross it (C,), where it shows
-    the share ``through`` (C, 3) of its back; 1 for what is no sheet."""
-    share = np.where(crosses[:, None], through, 1 - through)
-    return np.where(through.any(axis=1, keepdims=True), 2 * share, 1.0)
 
 
 def _number(index: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ import numpy as np
 from . import rays
 from .dithering import dither_threshold
 from .images import sample_image
+from .light_links import link_roles
 from .sheets import sheet_numbers
 from .snapshot import DIFFUSE_RAYS, DITHERED, FROM_BEHIND, NO_IMAGE, SHADOW_RAYS, SceneSnapshot
 
@@ -39,20 +40,29 @@ class ReferenceScene:
         clips = np.array([material.alpha_threshold > 0 for material in snapshot.materials])
         self._clipped = clips[snapshot.material_index]
         self._unseen_by = np.array([material.unseen_by for material in snapshot.materials])[snapshot.material_index]
-        sheet_of_material, self.sheet_shares = sheet_numbers(snapshot.materials)
+        self.links = link_roles([material.links for material in snapshot.materials])
+        sheet_of_material, sheets = sheet_numbers(snapshot.materials, self.links.of_surface)
+        self.sheet_shares, self.sheet_roles = sheets[:, :3], sheets[:, 3].astype(int)
         self.sheet = sheet_of_material[snapshot.material_index]  # (T,) see core/sheets.py
+        self.role = self.links.of_surface[snapshot.material_index]  # (T,) see core/light_links.py
 
     def closest(self, origins: np.ndarray, directions: np.ndarray) -> rays.Hits:
         """Nearest hits of rays ``origins``, ``directions`` (N, 3)."""
         return rays.closest_hit(self.triangles, origins, directions, self._hole_test(DIFFUSE_RAYS))
 
-    def visible(self, origins: np.ndarray, directions: np.ndarray, limits: np.ndarray) -> np.ndarray:
-        """(N,) bool: does nothing lie on the rays nearer than ``limits`` (N,)?"""
-        return ~rays.any_hit(self.triangles, origins, directions, limits, self._hole_test(SHADOW_RAYS))
+    def visible(self, origins: np.ndarray, directions: np.ndarray, limits: np.ndarray, group: int = 0) -> np.ndarray:
+        """(N,) bool: does nothing that blocks light of ``group`` lie on the rays nearer than ``limits`` (N,)?"""
+        return ~rays.any_hit(self.triangles, origins, directions, limits, self._hole_test(SHADOW_RAYS, group))
 
-    def _hole_test(self, kind: int):
-        """What rays of a kind pass through; None for nothing."""
+    def falls_on(self, group: int | np.ndarray, role: np.ndarray) -> np.ndarray:
+        """(N,) bool: does light of ``group`` fall on surfaces of ``role`` (N,)?"""
+        return self.links.lit[role, np.where(np.asarray(group) <= self.links.groups, group, 0)]
+
+    def _hole_test(self, kind: int, group: int = 0):
+        """What rays of a kind pass through on their way to emitters of ``group``; None for nothing."""
         unseen, one_sided = (self._unseen_by & kind) > 0, (self._unseen_by & FROM_BEHIND) > 0
+        if 0 < group <= self.links.groups:
+            unseen = unseen | ~self.links.blocks[self.role, group]
         if not (unseen.any() or one_sided.any() or self._clipped.any()):
             return None
         edge = self.triangles[:, 1:] - self.triangles[:, :1]

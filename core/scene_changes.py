@@ -294,7 +294,7 @@ def _material_aspects(materials: list[Material], images: list[int] | None) -> li
             "holes": (m.alpha, m.alpha_threshold, image(m.alpha_image), m.alpha_from_color)
             if m.alpha_threshold > 0
             else (),
-            "visibility": m.unseen_by,
+            "visibility": (m.unseen_by, m.links),
             "sheets": m.transmitted if any(m.transmitted) else (),
         }
         for m in materials

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .camera import Camera
+from .light_links import UNLINKED, Links
 from .light_profiles import LightProfile
 
 NO_IMAGE = -1
@@ -57,6 +58,7 @@ class Material:
     alpha_threshold: float = 0.0
     transmitted: tuple[float, float, float] = (0.0, 0.0, 0.0)
     unseen_by: int = 0  # sum of SHADOW_RAYS, DIFFUSE_RAYS and FROM_BEHIND: for these the surface is not there
+    links: Links = UNLINKED  # which emitters' light falls on it, and passes it
     backface_culling: bool = False  # stated only; light transport treats every surface as two-sided, like Cycles
 
 
@@ -96,6 +98,7 @@ class Light:
     dynamic: bool = False  # animated or marked dynamic: its direct light is not kept
     group: str = ""  # role in Explore mode and in reports
     profile: LightProfile | None = None  # what nodes make of its light; not of suns
+    link_group: int = 0  # see core.light_links
 
 
 @dataclass(frozen=True)

@@ -35,12 +35,14 @@ def _ints(info, *names: str) -> None:
 
 def _scene(info, defines: dict, first: int = 0, attributes: bool = True) -> int:
     """The scene's samplers: hierarchy and triangles; what surfaces are made of where ``attributes`` or holes need
-    it."""
+    it; and light linking where there is any."""
     names = ["bvh_nodes", "triangle_corners"]
     if attributes or "HAS_ALPHA" in defines:
         names += ["triangle_attributes", "materials"]
         if "HAS_IMAGES" in defines:
             names += ["image_table", "image_texels"]
+    if "HAS_LINKS" in defines:
+        names.append("links")
     return _samplers(info, *names, first=first)
 
 

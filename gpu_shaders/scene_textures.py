@@ -14,6 +14,7 @@ import numpy as np
 
 from ..core import bvh, emitters
 from ..core.errors import InputError
+from ..core.light_links import LinkRoles, link_roles
 from ..core.light_profiles import LightProfile
 from ..core.scene_changes import SceneChanges, ShapeChange, boxes_around
 from ..core.sheets import sheet_numbers
@@ -82,6 +83,7 @@ class SceneTextures:
         rebuilt.
         """
         hierarchy = "kept" if changes.shape is None else self._reshape(snapshot, changes.shape)
+        groups = self._links.groups
         if hierarchy == "rebuilt" or changes.materials or changes.emission or changes.reflectance:
             assert emitter_density is not None
             self._send_surfaces(snapshot, emitter_density)
@@ -92,7 +94,7 @@ class SceneTextures:
             self._send_surfaces(snapshot, emitter_density, np.flatnonzero(differs))
         if changes.images:
             self._send_images(snapshot)
-        if changes.any_light:
+        if changes.any_light or groups != self._links.groups:
             self.set_lights(snapshot.lights, self._origin)
         return hierarchy
 
@@ -101,6 +103,7 @@ class SceneTextures:
         self.light_count = len(lights)
         self._lights = pack_lights(lights, origin)
         self._profiles = [light.profile for light in lights]
+        self._groups = np.array([light.link_group for light in lights], np.int64)
         self._send_lights()
 
     def set_suns(self, suns: list[Light]) -> None:
@@ -112,6 +115,8 @@ class SceneTextures:
     def _send_lights(self) -> None:
         """Lamps, suns, and what nodes make of lamps' light."""
         rows = np.concatenate([self._lights, self._suns])
+        known = self._groups <= self._links.groups  # others light everything that there is
+        rows[: len(known), 4, 3] += 2 * self._groups * known
         self._textures["lights"] = upload(with_profiles(rows, self._profiles), "lights")
 
     def _build(self, snapshot: SceneSnapshot) -> None:
@@ -145,7 +150,7 @@ class SceneTextures:
         """Materials, sheets, emitters, and corners and attributes of all triangles or of those at ``only`` (K,) in leaf
         order."""
         for name, values in self._surface_rows(snapshot, density, slice(None) if only is None else only).items():
-            if only is None or name in ("materials", "sheets", "emitters"):
+            if only is None or name in ("materials", "sheets", "links", "emitters"):
                 self._textures[name] = upload(values, name.replace("_", " "))
             elif len(only):
                 scatter_rows(self._textures[name], only, values)
@@ -157,8 +162,9 @@ class SceneTextures:
         clips = np.array([m.alpha_threshold > 0 for m in snapshot.materials] or [False])
         unseen = np.array([m.unseen_by for m in snapshot.materials] or [0])
         self.has_alpha, self.has_unseen = bool(clips.any()), bool(unseen.any())
-        sheet_of_material, shares = sheet_numbers(snapshot.materials)
-        self.has_sheets = len(shares) > 1
+        self._links = link_roles([m.links for m in snapshot.materials])
+        sheet_of_material, sheets = sheet_numbers(snapshot.materials, self._links.of_surface)
+        self.has_sheets = len(sheets) > 1
         self._density = density[order]
         self.emitter_count = int(np.count_nonzero(self._density))
         self.emitter_reach = emitters.reach(self._density)
@@ -167,11 +173,13 @@ class SceneTextures:
         rows = np.zeros((len(corners), 3, 4), np.float32)
         rows[:, :, :3] = corners
         rows[:, 0, 3] = self.hierarchy.leaf_end[at]
-        rows[:, 1, 3] = clips[material] + 2 * unseen[material]  # bits, see ray_lib
+        roles = self._links.of_surface[material]
+        rows[:, 1, 3] = clips[material] + 2 * unseen[material] + 16 * roles  # bits, see ray_lib
         rows[:, 2, 3] = sheet_of_material[material]
         return {
             "materials": _materials(snapshot),
-            "sheets": np.pad(shares, ((0, 0), (0, 1))).astype(np.float32),
+            "sheets": sheets.astype(np.float32),
+            "links": _links(self._links),
             "emitters": _emitters(self._density, self.corners, order),
             "triangle_corners": rows,
             "triangle_attributes": _attributes(snapshot, order[at], material, corners, self._density[at]),
@@ -191,6 +199,8 @@ class SceneTextures:
             "HAS_IMAGES": self.has_images,
             "HAS_UNSEEN": self.has_unseen,
             "HAS_PROFILES": any(profile is not None for profile in self._profiles),
+            "HAS_LINKS": self._links.groups > 0,
+            "LINK_GROUPS": self._links.groups or None,
             "STACK_SIZE": stack_size,
             "LEAN_STACK": gpu.platform.device_type_get() != "SOFTWARE",
         }
@@ -225,6 +235,8 @@ class SceneTextures:
     def bind_rays(self, shader) -> None:
         """Binds what a shader compiled with ``ray_defines`` and no surfaces declares."""
         self.bind(shader, "bvh_nodes", "triangle_corners")
+        if self._links.groups:
+            self.bind(shader, "links")
         if self.has_alpha:
             self.bind(shader, "triangle_attributes", "materials")
             if self.has_images:
@@ -259,6 +271,8 @@ class SceneTextures:
     def bind_surfaces(self, shader) -> None:
         """Binds what a shader compiled with ``surface_defines`` declares."""
         self.bind(shader, "bvh_nodes", "triangle_corners", "triangle_attributes", "materials")
+        if self._links.groups:
+            self.bind(shader, "links")
         if self.has_images:
             self.bind(shader, "image_table", "image_texels")
 
@@ -320,6 +334,14 @@ def _materials(snapshot: SceneSnapshot) -> np.ndarray:
         row[1] = (*material.emission, material.emission_image)
         row[2] = (material.alpha, material.alpha_threshold, material.alpha_image, material.alpha_from_color)
     return rows
+
+
+def _links(roles: LinkRoles) -> np.ndarray:
+    """(R·(G + 1), 4) elements of ray_lib's links."""
+    rows = np.zeros((*roles.lit.shape, 4), np.float32)
+    rows[..., 0], rows[..., 1], rows[..., 2] = roles.lit, roles.blocks, ~roles.blocks.all(axis=0)
+    rows[:, 0, 0] = roles.group
+    return rows.reshape(-1, 4)
 
 
 def pack_lights(lights: list[Light], origin: np.ndarray) -> np.ndarray:

@@ -71,6 +71,8 @@ def render_panoramas(
         copy.render.resolution_x, copy.render.resolution_y = width, height
         panoramic_camera(copy.camera)
         layer = copy.view_layers[0].name
+        for other in copy.view_layers[1:]:  # Cycles, which keeps its data, shows them from the second picture on
+            copy.view_layers.remove(other)
         for index, position in enumerate(positions):
             copy.camera.location = position
             copy.cycles.seed = (seed + index) % (2**31 - 1)

@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 
 from ..core.snapshot import Image
+from .image_interpolation import finer_grid
 from .notices import Notices
 
 # A probe's texel sees a patch of surface, never a single pixel of a large texture: images are box-filtered down to this
@@ -28,21 +29,30 @@ class ImageTable:
     def __init__(self, notices: Notices):
         self.images: list[Image] = []
         self._notices = notices
-        self._pixels: dict[int, np.ndarray | None] = {}
+        self._pixels: dict[tuple, np.ndarray | None] = {}
         self._channels: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         self._whole: dict[int, np.ndarray] = {}
         self._indices: dict[tuple[int, str], int] = {}
 
-    def pixels(self, image: bpy.types.Image, user: str) -> np.ndarray | None:
+    def pixels(
+        self, image: bpy.types.Image, user: str, interpolation: str = "Closest", extension: str = "REPEAT"
+    ) -> np.ndarray | None:
         """(height, width, 4) float32 linear RGB (not premultiplied) and alpha; None, and a warning, where there are
         none.
 
-        ``user`` names in the warning what wants the image, such as ``material 'Floor'``.
+        ``user`` names in the warning what wants the image, such as ``material 'Floor'``; ``interpolation`` and
+        ``extension`` are those of the node that shows it.
         """
-        key = image.as_pointer()
+        key = image.as_pointer(), "", ""
         if key not in self._pixels:
             self._pixels[key] = self._read(image, user)
-        return self._pixels[key]
+        if interpolation == "Closest" or self._pixels[key] is None or self._decoding(image) is not _SRGB_TO_LINEAR:
+            return self._pixels[key]
+        own = image.as_pointer(), interpolation, extension
+        if own not in self._pixels:
+            finer = self._interpolated(image, interpolation, extension)
+            self._pixels[own] = self._pixels[key] if finer is None else finer
+        return self._pixels[own]
 
     def channels(self, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(height, width, 3) and (height, width, 1) views of ``pixels``, the same two objects every time."""
@@ -99,6 +109,25 @@ class ImageTable:
             return pixels
         return np.nan_to_num(pixels, nan=0.0, posinf=0.0, neginf=0.0)
 
+    def _interpolated(self, image: bpy.types.Image, interpolation: str, extension: str) -> np.ndarray | None:
+        """The pixels of an opaque sRGB image with those between them; None where that makes no difference."""
+        size: tuple[int, int] = image.size
+        width, height = size
+        encoded = np.empty((height, width, image.channels), np.float32)
+        image.pixels.foreach_get(encoded.ravel())
+        if encoded.shape[2] == 4 and bool((encoded[..., 3] != 1).any()):
+            return None
+        finer = finer_grid(encoded[..., :3], _srgb_to_linear, interpolation, extension)
+        if finer is None:
+            return None
+        rgb = _srgb_to_linear(finer)
+        shrink = min(1.0, MAX_EDGE / max(rgb.shape[:2]))
+        for axis in (1, 0):
+            rgb = _box_filter(rgb, max(1, round(rgb.shape[axis] * shrink)), axis)
+        pixels = np.ones((*rgb.shape[:2], 4), np.float32)
+        pixels[..., :3] = rgb
+        return pixels
+
     def _decoding(self, image: bpy.types.Image) -> np.ndarray | None:
         """Table from byte to linear value, or None where Blender hands out linear values already."""
         if image.is_float:
@@ -109,6 +138,11 @@ class ImageTable:
         if space.name != "sRGB":
             self._notices.append(f"image '{image.name}' has colour space '{space.name}': it is read as sRGB")
         return _SRGB_TO_LINEAR
+
+
+def _srgb_to_linear(values: np.ndarray) -> np.ndarray:
+    """float32 0..1 decoded."""
+    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 def _to_rgba(encoded: np.ndarray, table: np.ndarray | None, image: bpy.types.Image) -> np.ndarray:

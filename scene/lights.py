@@ -19,6 +19,8 @@ from .notices import Notices
 from .shader_nodes import NodeEvaluator
 from .surface_shaders import evaluate_shader
 
+_LEAST_SHEAR = 1e-5
+_LEAST_VOLUME = 1e-6  # of the parallelepiped of three unit axes: less is flat
 _FEW_BOUNCES = 12  # fewer can be told from light that bounces until it is gone
 
 ROLE_PROPERTY, GROUP_PROPERTY, INTENSITY_PROPERTY = "gridlight_role", "gridlight_group", "gridlight_intensity"
@@ -34,13 +36,14 @@ class LightTable:
         self._images = images
         self._notices = notices
 
-    def add(self, item: bpy.types.Object, matrix: np.ndarray, name: str) -> None:
-        """Add light object ``item`` placed by ``matrix`` (4, 4) float64, which for instances differs from its own.
+    def add(self, item: bpy.types.Object, matrix: np.ndarray, name: str, link_group: int = 0) -> None:
+        """Add light object ``item`` of a group of ``core.light_links``, placed by ``matrix`` (4, 4) float64, which for
+        instances differs from its own.
 
         Lights that add nothing to diffuse light are passed over: portals, those without power, those invisible to
         diffuse rays.
         """
-        light = _read_light(item, matrix, name, *self._node_tint(item.data), self._notices)
+        light = _read_light(item, matrix, name, link_group, *self._node_tint(item.data), self._notices)
         if light is not None:
             self.lights.append(light)
 
@@ -64,7 +67,7 @@ class LightTable:
         return emission.rgb(), None
 
 
-def _read_light(item, matrix, name, node_tint, profile, notices) -> Light | None:
+def _read_light(item, matrix, name, link_group, node_tint, profile, notices) -> Light | None:
     data = item.data
     if not item.visible_diffuse or (data.type == "AREA" and data.cycles.is_portal):
         return None
@@ -72,7 +75,7 @@ def _read_light(item, matrix, name, node_tint, profile, notices) -> Light | None
     color *= float(item.get(INTENSITY_PROPERTY, 1.0))
     if data.use_temperature:
         color *= np.array(data.temperature_color, float)
-    frame, scale = _frame(matrix)
+    frame, scale = _cone_frame(matrix) if data.type == "SPOT" else _frame(matrix)
     if not (np.isfinite(color).all() and np.isfinite(frame).all()):
         notices.append(f"light '{name}' has a power that is not finite: it is left out")
         return None
@@ -88,13 +91,12 @@ def _read_light(item, matrix, name, node_tint, profile, notices) -> Light | None
         "dynamic": is_dynamic(item),
         "group": str(item.get(GROUP_PROPERTY, "")),
         "profile": profile,
+        "link_group": link_group,
     }
     kind = _KINDS[data.type](data, scale)
     values["color"] = tuple(float(value) for value in color * kind.pop("unit"))
     if data.cycles.max_bounces < _FEW_BOUNCES:
         notices.group("lights whose bounces are limited bounce on here", name)
-    if _linked(item):
-        notices.append(f"light '{name}' uses light linking: it lights every object here")
     return Light(**values, **kind)
 
 
@@ -117,16 +119,23 @@ def is_animated(block: bpy.types.ID | None) -> bool:
     return animation is not None and bool(animation.action or animation.drivers or animation.nla_tracks)
 
 
-def _linked(item: bpy.types.Object) -> bool:
-    linking = item.light_linking
-    return linking.receiver_collection is not None or linking.blocker_collection is not None
-
-
 def _frame(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The orthonormal frame of ``matrix`` (4, 4) and its scale (3,)."""
     scale = np.linalg.norm(matrix[:3, :3], axis=0)
     frame = matrix.copy()
     frame[:3, :3] /= np.where(scale > 0, scale, 1.0)
+    return frame, scale
+
+
+def _cone_frame(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same for cones, which live in the coordinates of their object: where those are sheared, rows of the inverse
+    and not axes tell what a direction is in them."""
+    frame, scale = _frame(matrix)
+    sheared = np.abs(frame[:3, :3].T @ frame[:3, :3] - np.eye(3)).max() > _LEAST_SHEAR
+    if sheared and (scale > 0).all() and abs(np.linalg.det(frame[:3, :3])) > _LEAST_VOLUME:
+        rows = np.linalg.inv(matrix[:3, :3])
+        length = np.linalg.norm(rows, axis=1)
+        frame[:3, :3], scale = (rows / length[:, None]).T, 1 / length
     return frame, scale
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
+from ..core.light_links import UNLINKED, Links
 from ..core.snapshot import DIFFUSE_RAYS, DITHERED, FROM_BEHIND, NO_IMAGE, Material
 from .images import ImageTable
 from .node_links import Unsupported, active_output, find_socket
@@ -32,6 +33,7 @@ class Look:
 
     intensity: float = 1.0  # factor on emission
     unseen_by: int = 0  # see core.snapshot.Material
+    links: Links = UNLINKED
 
 
 PLAIN = Look()
@@ -57,7 +59,8 @@ class MaterialTable:
             self._indices[key] = len(self.materials)
             factor = 0.0 if look.unseen_by & DIFFUSE_RAYS else look.intensity  # what no ray sees lights nothing
             emission = _three(value * factor for value in row.emission)
-            self.materials.append(replace(row, emission=emission, unseen_by=row.unseen_by | look.unseen_by))
+            unseen_by = row.unseen_by | look.unseen_by
+            self.materials.append(replace(row, emission=emission, unseen_by=unseen_by, links=look.links))
             self.domains.append(self.domains[own])
         elif key not in self._indices:
             self._indices[key] = len(self.materials)

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import InputError
+from ..core.light_links import Links
 from ..core.snapshot import DIFFUSE_RAYS, SHADOW_RAYS, Light, SceneSnapshot, World
 from ..core.steps import STEP_SECONDS, Pace, Steps, run
 from .camera import read_camera
@@ -16,6 +17,7 @@ from .evaluation import as_in_viewport, at_render_quality, rendered_objects
 from .geometry import MeshArrays, MeshCopy, WorldTriangles, copy_mesh, place, triangulated
 from .images import ImageTable
 from .instance_facts import InstanceFacts, facts_of
+from .light_linking import LightLinking
 from .lights import INTENSITY_PROPERTY, LightTable
 from .materials import Look, MaterialTable, apply_domain
 from .notices import Notices
@@ -59,7 +61,7 @@ class _Harvest:
     meshes: dict[tuple, tuple[MeshCopy, str]] = field(default_factory=dict)  # and the name of the first with it
     wants: dict[int, Wants] = field(default_factory=dict)  # by material
     alone: int = 0  # instances so far of meshes whose materials tell them apart
-    lights: list[tuple[bpy.types.Object, np.ndarray, str]] = field(default_factory=list)
+    lights: list[tuple[bpy.types.Object, np.ndarray, str, int]] = field(default_factory=list)  # with their groups
 
 
 def read_scene(
@@ -139,8 +141,8 @@ def read_lights(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list
         lambda depsgraph: _harvest(depsgraph, rendered_objects(view_layer), rigid_bodies, notices, meshes=False),
     )
     lights = LightTable(ImageTable(notices), notices, measures=False)
-    for item, matrix, name in harvest.lights:
-        lights.add(item, matrix, name)
+    for found in harvest.lights:
+        lights.add(*found)
     return lights.lights
 
 
@@ -178,8 +180,8 @@ def _read(scene, view_layer, evaluate, pace: Pace, world: World | None = None) -
         group.atlases = [atlas for material in placed if (atlas := surfaces.corner_uvs(material, group)) is not None]
     surface = yield from pace.in_background(_assembled, list(harvest.groups.values()), materials, notices)
     lights = LightTable(images, notices, measures=world is None)
-    for item, matrix, name in harvest.lights:
-        lights.add(item, matrix, name)
+    for found in harvest.lights:
+        lights.add(*found)
     yield
     background = world or read_world(scene, notices)
     yield
@@ -206,6 +208,7 @@ def _harvest(
             so their places are taken from there.
     """
     harvest = _Harvest()
+    linking = LightLinking(depsgraph.objects)
     for instance in depsgraph.object_instances:  # each one dies with its step of the iterator
         item = instance.object
         owner = instance.parent if instance.is_instance else item
@@ -221,10 +224,11 @@ def _harvest(
         if not np.isfinite(matrix).all():
             notices.group("objects whose transform is not finite are left out", name)
         elif item.type == "LIGHT":
-            harvest.lights.append((item.original, matrix, name))
+            harvest.lights.append((item.original, matrix, name, linking.group(item)))
         elif item.visible_diffuse or item.visible_shadow:
             _warn_of(item, notices)
-            _add_mesh(harvest, item, instance, matrix, name)
+            links = linking.links(item, instance.parent if instance.is_instance else None)
+            _add_mesh(harvest, item, instance, matrix, name, _look(item, links))
     return harvest
 
 
@@ -237,12 +241,12 @@ def _warn_of(item: bpy.types.Object, notices: Notices) -> None:
         notices.group("holdouts and shadow catchers are lit like any other surface", item.name)
 
 
-def _look(item: bpy.types.Object) -> Look:
+def _look(item: bpy.types.Object, links: Links) -> Look:
     unseen = (0 if item.visible_shadow else SHADOW_RAYS) + (0 if item.visible_diffuse else DIFFUSE_RAYS)
-    return Look(float(item.get(INTENSITY_PROPERTY, 1.0)), unseen)
+    return Look(float(item.get(INTENSITY_PROPERTY, 1.0)), unseen, links)
 
 
-def _add_mesh(harvest: _Harvest, item, instance, matrix: np.ndarray, name: str) -> None:
+def _add_mesh(harvest: _Harvest, item, instance, matrix: np.ndarray, name: str, look: Look) -> None:
     mesh = item.data
     slots = _slot_materials(item, mesh)
     asked = [_wants(harvest, material) for material in slots]
@@ -250,7 +254,6 @@ def _add_mesh(harvest: _Harvest, item, instance, matrix: np.ndarray, name: str) 
     key = (mesh.as_pointer(), attributes)
     if key not in harvest.meshes:
         harvest.meshes[key] = _copy_of(item, sorted(attributes)), name
-    look = _look(item)
     alone = -1
     if any(one.instance for one in asked):
         alone = harvest.alone = min(harvest.alone + 1, _MOST_ALONE)

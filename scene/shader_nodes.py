@@ -128,7 +128,7 @@ def _image_texture(evaluator, node, socket, scope):
     owner = evaluator.owner
     if node.image is None:
         raise Unsupported("no image is chosen")
-    pixels = evaluator.images.pixels(node.image, owner)
+    pixels = evaluator.images.pixels(node.image, owner, node.interpolation, node.extension)
     if pixels is None:
         raise Reported("its image is missing")
     try:

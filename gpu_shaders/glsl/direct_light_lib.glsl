@@ -3,6 +3,7 @@
  *
  * lights, 6 elements each (scene_textures.py):
  *   position, kind | color, radius | right, size x | up, size y | back, casts shadow | parameters of the kind, profile
+ * With HAS_LINKS twice the light's group is added to whether it casts a shadow.
  * With HAS_PROFILES, after all lights their profiles (core/light_profiles.py), PROFILE_WIDTH × PROFILE_HEIGHT directions and PROFILE_DISTANCES logarithms each;
  * a light's profile is the first element of its own, 0 for none.
  */
@@ -148,6 +149,13 @@ LightSample sample_light(int light, vec3 point, vec2 u)
   return light_sample;
 }
 
+#ifdef HAS_LINKS
+int group_of_light(int light)
+{
+  return int(element(lights, 6 * light + 4).w) >> 1;
+}
+#endif
+
 /* Irradiance of one light at a surface: one shadow ray to the place on the light that `u` picks. */
 vec3 light_irradiance(int light, vec3 point, vec3 origin, vec3 normal, vec2 u)
 {
@@ -156,8 +164,15 @@ vec3 light_irradiance(int light, vec3 point, vec3 origin, vec3 normal, vec2 u)
   if (cosine <= 0.0 || light_sample.irradiance == vec3(0.0)) {
     return vec3(0.0);
   }
-  bool shadow = element(lights, 6 * light + 4).w != 0.0;
-  if (shadow && trace_any(origin, light_sample.direction, light_sample.distance * 0.9999)) {
+  int group = 0;
+#ifdef HAS_LINKS
+  group = group_of_light(light);
+  if (!falls_on(group, lit_role)) {
+    return vec3(0.0);
+  }
+#endif
+  bool shadow = (int(element(lights, 6 * light + 4).w) & 1) != 0;
+  if (shadow && trace_blockers(origin, light_sample.direction, light_sample.distance * 0.9999, group)) {
     return vec3(0.0);
   }
   return light_sample.irradiance * cosine;
@@ -179,6 +194,11 @@ vec3 lamps_unshadowed(vec3 point, vec3 normal, uvec3 key, int index)
 {
   vec3 sum = vec3(0.0);
   for (int light = FIRST_LIGHT; light < light_count; light++) {
+#ifdef HAS_LINKS
+    if (!falls_on(group_of_light(light), lit_role)) {
+      continue;
+    }
+#endif
     LightSample light_sample = sample_light(light, point, sample_r2(key + uvec3(0u, 0u, uint(light) * 0x9E3779B9u), index));
     sum += light_sample.irradiance * max(dot(light_sample.direction, normal), 0.0);
   }

@@ -13,6 +13,7 @@ struct EmitterSample {
   vec3 normal;
   vec3 radiance;
   float density; /* per m² */
+  int group;     /* of light linking; 0 without HAS_LINKS */
 };
 
 int find_emitter(float u)
@@ -58,6 +59,11 @@ EmitterSample sample_emitter(vec3 u)
   chosen.normal = normalize(cross(ab, ac));
   chosen.density = emitter.z;
   chosen.radiance = emitter_radiance(triangle, barycentric);
+  chosen.group = 0;
+#ifdef HAS_LINKS
+  chosen.group = group_of_triangle(triangle);
+  chosen.radiance = falls_on(chosen.group, lit_role) ? chosen.radiance : vec3(0.0);
+#endif
 #ifdef HAS_ALPHA
   if (is_hole(triangle, barycentric)) {
     chosen.radiance = vec3(0.0);
@@ -68,9 +74,15 @@ EmitterSample sample_emitter(vec3 u)
 
 /* Share of the light from an emitter `distance` away that points on emitters answer for; directions about the normal answer for the
  * rest. Balance heuristic (Veach and Guibas, SIGGRAPH 1995) of CANDIDATES points and one direction, so no estimate is larger than π·L
- * however near the emitter is; beyond emitter_reach, where directions would hardly find it, points answer for all. */
-float point_share(float density, float distance, float surface_cosine, float emitter_cosine)
+ * however near the emitter is; beyond emitter_reach, where directions would hardly find it, points answer for all. So they do where light of
+ * the emitter's `group` passes surfaces, at which directions end. */
+float point_share(int group, float density, float distance, float surface_cosine, float emitter_cosine)
 {
+#ifdef HAS_LINKS
+  if (has_passage(group)) {
+    return 1.0;
+  }
+#endif
   if (distance >= emitter_reach) {
     return 1.0;
   }
@@ -82,6 +94,7 @@ float point_share(float density, float distance, float surface_cosine, float emi
 vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
 {
   vec3 best_irradiance = vec3(0.0), best_point = vec3(0.0);
+  int best_group = 0;
   float best_weight = 0.0, total = 0.0;
   float choice = sample_r3(key + uvec3(0x68E31DA4u, 0u, 0u), index).x;
   for (int i = 0; i < CANDIDATES; i++) {
@@ -93,7 +106,7 @@ vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, 
     float surface_cosine = max(dot(direction, normal), 0.0);
     float emitter_cosine = abs(dot(direction, emitter.normal));
     vec3 irradiance = emitter.radiance * (surface_cosine * emitter_cosine / (squared * emitter.density) *
-                                          point_share(emitter.density, distance, surface_cosine, emitter_cosine));
+                                          point_share(emitter.group, emitter.density, distance, surface_cosine, emitter_cosine));
     float weight = irradiance.r + irradiance.g + irradiance.b;
     total += weight;
     /* one number chooses among all candidates: what is left of it is spread over 0..1 again */
@@ -101,6 +114,7 @@ vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, 
       choice = choice * total / weight;
       best_irradiance = irradiance;
       best_point = emitter.point;
+      best_group = emitter.group;
       best_weight = weight;
     }
     else if (total > weight) {
@@ -113,7 +127,7 @@ vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, 
   /* From where the ray starts, which is not `point`: to an emitter a few centimetres away it would be too long and meet the emitter itself. */
   vec3 way = best_point - origin;
   float way_length = max(length(way), 1.0e-20);
-  if (trace_any(origin, way / way_length, way_length * 0.9999)) {
+  if (trace_blockers(origin, way / way_length, way_length * 0.9999, best_group)) {
     return vec3(0.0);
   }
   return best_irradiance * (total / (best_weight * float(CANDIDATES)));
@@ -146,10 +160,17 @@ vec3 emitter_direction_irradiance(vec3 origin, vec3 normal, uvec3 key, int index
   if (density == 0.0) {
     return vec3(0.0);
   }
+  int group = 0;
+#ifdef HAS_LINKS
+  group = group_of_triangle(hit.triangle);
+  if (!falls_on(group, lit_role)) {
+    return vec3(0.0);
+  }
+#endif
   vec3 a = element(triangle_corners, 3 * hit.triangle).xyz;
   vec3 across = cross(element(triangle_corners, 3 * hit.triangle + 1).xyz - a,
                       element(triangle_corners, 3 * hit.triangle + 2).xyz - a);
-  float share = point_share(density, hit.distance, dot(direction, normal), abs(dot(direction, normalize(across))));
+  float share = point_share(group, density, hit.distance, dot(direction, normal), abs(dot(direction, normalize(across))));
   return emitter_radiance(hit.triangle, hit.barycentric) * ((1.0 - share) * 3.141592653589793);
 }
 
@@ -171,5 +192,5 @@ vec3 emitter_unshadowed(vec3 point, vec3 normal, uvec3 key, int index)
   float surface_cosine = max(dot(direction, normal), 0.0);
   float emitter_cosine = abs(dot(direction, emitter.normal));
   return emitter.radiance * (surface_cosine * emitter_cosine / (squared * emitter.density) *
-                             point_share(emitter.density, distance, surface_cosine, emitter_cosine));
+                             point_share(emitter.group, emitter.density, distance, surface_cosine, emitter_cosine));
 }

@@ -33,6 +33,9 @@ void main()
   uvec3 key = uvec3(uint(first_key + patch_index), 0u, uint(seed));
   int shift = int(pcg3d(key + uvec3(0u, 0x85EBCA6Bu, 0u)).x % uint(POINTS));
   vec3 irradiance = vec3(0.0);
+#ifdef HAS_LINKS
+  lit_role = role_of_sheet(int(element(sheet_numbers, patch_index).x));
+#endif
   for (int i = first; i < min(first + SAMPLES_EACH, samples); i++) {
     int place = samples < POINTS ? (i * POINTS + shift) / samples : i % POINTS;
     vec4 at = element(patch_points, POINTS * patch_index + place);

@@ -30,11 +30,16 @@ void main()
   vec3 normal = unpack_normal(at.w);
   vec3 brought = vec3(0.0), throughput = vec3(1.0);
   int sheet = 0;
+  bool on_surface = false;
 #ifdef HAS_SHEETS
-  vec3 through = share_of_back(int(element(sheet_numbers, patch_index).x));
+  int own_sheet = int(element(sheet_numbers, patch_index).x);
+  vec3 through = share_of_back(own_sheet);
   bool crosses = through != vec3(0.0) && (number & 1) != 0;
   normal = crosses ? -normal : normal;
   throughput = side_weight(through, crosses);
+#endif
+#ifdef HAS_LINKS
+  lit_role = role_of_sheet(own_sheet);
 #endif
   vec3 origin = leave_surface(at.xyz, normal);
   uvec3 key = uvec3(uint(first_key + patch_index), 0x85EBCA6Bu, uint(seed));
@@ -50,15 +55,21 @@ void main()
       break;
     }
     Surface surface = resolve_surface(hit.triangle, hit.barycentric, origin, direction, 0.5);
-    brought += surface.emitter_density == 0.0 ? throughput * surface.emission : vec3(0.0);
+    bool by_ray = surface.emitter_density == 0.0; /* else points on emitters answer for its emission */
+#ifdef HAS_LINKS
+    by_ray = by_ray && falls_on(group_of_triangle(hit.triangle), lit_role);
+    lit_role = role_of_triangle(hit.triangle);
+#endif
+    brought += by_ray ? throughput * surface.emission : vec3(0.0);
     throughput *= surface.albedo;
     if (throughput == vec3(0.0)) {
       break;
     }
 #ifdef HAS_SHEETS
     sheet = sheet_of_triangle(hit.triangle);
+    on_surface = share_of_back(sheet) != vec3(0.0);
 #endif
-    end.xyz = sheet > 0 ? surface.position : pull_back(surface.position, direction, hit.distance);
+    end.xyz = on_surface ? surface.position : pull_back(surface.position, direction, hit.distance);
     end.w = pack_normal(octahedral_encode(surface.normal));
 #if SEGMENTS > 1
     if (segment < SEGMENTS - 1) {

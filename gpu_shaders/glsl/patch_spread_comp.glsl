@@ -31,6 +31,9 @@ void main()
   }
   int patch_index = first_patch + entry;
   uvec3 key = uvec3(uint(patch_index), 0u, uint(seed));
+#ifdef HAS_LINKS
+  lit_role = role_of_sheet(int(element(sheet_numbers, patch_index).x));
+#endif
   float sum = 0.0, squares = 0.0, candidate_variance = 0.0;
   const int count = POINTS / 2;
   for (int i = 0; i < count; i++) {

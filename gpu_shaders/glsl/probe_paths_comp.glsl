@@ -79,10 +79,15 @@ void main()
       break;
     }
     Surface surface = resolve_surface(hit.triangle, hit.barycentric, origin, direction, segment == 0 ? 0.05 : 0.5);
-    if (surface.emitter_density == 0.0) {
+    bool falls = true;
+#ifdef HAS_LINKS
+    falls = falls_on(group_of_triangle(hit.triangle), lit_role);
+    lit_role = role_of_triangle(hit.triangle);
+#endif
+    if (surface.emitter_density == 0.0 && falls) {
       radiance += throughput * surface.emission;
     }
-    else if (segment == 0) {
+    else if (segment == 0 && surface.emitter_density > 0.0) {
       vec3 a = element(triangle_corners, 3 * hit.triangle).xyz;
       vec3 across = cross(element(triangle_corners, 3 * hit.triangle + 1).xyz - a,
                           element(triangle_corners, 3 * hit.triangle + 2).xyz - a);

@@ -5,7 +5,8 @@
  * "Understanding the Efficiency of Ray Traversal on GPUs", HPG 2009): drivers that run threads side by side pay for both kinds of step
  * otherwise. The triangle test is watertight: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection",
  * JCGT 2013. Both sides of a triangle are hit. With HAS_ALPHA, triangles of clipped materials ask surface_lib's
- * `is_hole` first; with HAS_UNSEEN, rays pass triangles that their kind does not see.
+ * `is_hole` first; with HAS_UNSEEN, rays pass triangles that their kind does not see; with HAS_LINKS, shadow rays to an emitter those that
+ * are none of its blockers.
  *
  * Samplers: bvh_nodes, triangle_corners.
  */
@@ -14,6 +15,40 @@ const float NO_HIT = 3.0e38;
 const int NO_NODE = -2147483647; /* in place of a node or leaf */
 const int CLIPPED = 1, UNSEEN_BY_SHADOW_RAYS = 2, UNSEEN_BY_DIFFUSE_RAYS = 4,
           UNSEEN_FROM_BEHIND = 8; /* bits of a triangle, w of its corner 1 */
+const int ROLE_SHIFT = 4; /* a triangle's role in light linking is what stands above its other bits */
+
+#ifdef HAS_LINKS
+/* Light linking, see core/light_links.py. links, LINK_GROUPS + 1 elements a role: group of its own emission; then for each group whether its light
+ * falls on surfaces of this role, and whether they block it. Group 0 is not linked. */
+int lit_role = -1; /* of the surface that is being lit, said before light is asked for; −1: an eye, which sees all */
+
+int role_of_triangle(int triangle)
+{
+  return int(element(triangle_corners, 3 * triangle + 1).w) >> ROLE_SHIFT;
+}
+
+/* The group that the emission of a triangle belongs to. */
+int group_of_triangle(int triangle)
+{
+  return int(element(links, role_of_triangle(triangle) * (LINK_GROUPS + 1)).x);
+}
+
+bool falls_on(int group, int role)
+{
+  return group == 0 || role < 0 || element(links, role * (LINK_GROUPS + 1) + group).x != 0.0;
+}
+
+bool is_blocked_by(int group, int role)
+{
+  return group == 0 || element(links, role * (LINK_GROUPS + 1) + group).y != 0.0;
+}
+
+/* Is there anything that light of the group passes? */
+bool has_passage(int group)
+{
+  return element(links, group).z != 0.0;
+}
+#endif
 
 struct Ray {
   vec3 origin;
@@ -80,7 +115,8 @@ bool starts_on(Ray ray, vec3 a, vec3 b, vec3 c)
 }
 
 /* Tests triangle `index`; on a hit nearer than hit.distance replaces it. Returns true where its leaf ends. `unseen`: the bit of triangles
- * that the ray passes. */
+ * that the ray passes,
+ * and above ROLE_SHIFT the group of emitters that it goes to. */
 bool intersect_triangle(Ray ray, int index, int unseen, inout Hit hit)
 {
   vec4 corner = element(triangle_corners, 3 * index);
@@ -102,8 +138,15 @@ bool intersect_triangle(Ray ray, int index, int unseen, inout Hit hit)
     if (distance > 0.0 && distance < hit.distance &&
         !starts_on(ray, corner.xyz - ray.origin, corner1.xyz - ray.origin, corner2.xyz - ray.origin)) {
       vec2 barycentric = vec2(v, w) / determinant;
-#ifdef HAS_UNSEEN
+#if defined(HAS_UNSEEN) || defined(HAS_LINKS)
       int flags = int(corner1.w);
+#endif
+#ifdef HAS_LINKS
+      if (!is_blocked_by(unseen >> ROLE_SHIFT, flags >> ROLE_SHIFT)) {
+        return corner.w != 0.0;
+      }
+#endif
+#ifdef HAS_UNSEEN
       if ((flags & unseen) != 0 ||
           ((flags & UNSEEN_FROM_BEHIND) != 0 &&
            dot(cross(corner1.xyz - corner.xyz, corner2.xyz - corner.xyz), ray.direction) > 0.0)) {
@@ -205,8 +248,8 @@ Hit trace_view(vec3 origin, vec3 direction)
   return trace_nearest(origin, direction, NO_HIT, 0);
 }
 
-/* Is anything hit nearer than `limit`? */
-bool trace_any(vec3 origin, vec3 direction, float limit)
+/* Is anything hit nearer than `limit` that does not have the bit `unseen`? */
+bool trace_any_seen(vec3 origin, vec3 direction, float limit, int unseen)
 {
   Ray ray = make_ray(origin, direction);
   Hit hit = Hit(limit, -1, vec2(0.0));
@@ -234,7 +277,7 @@ bool trace_any(vec3 origin, vec3 direction, float limit)
       }
     }
     int index = -1 - item;
-    while (!intersect_triangle(ray, index, UNSEEN_BY_SHADOW_RAYS, hit)) {
+    while (!intersect_triangle(ray, index, unseen, hit)) {
       index++;
     }
     if (hit.triangle >= 0) {
@@ -245,4 +288,16 @@ bool trace_any(vec3 origin, vec3 direction, float limit)
     }
     item = stack[--top];
   }
+}
+
+/* Is anything hit nearer than `limit` that blocks light of a group of emitters? */
+bool trace_blockers(vec3 origin, vec3 direction, float limit, int group)
+{
+  return trace_any_seen(origin, direction, limit, UNSEEN_BY_SHADOW_RAYS | (group << ROLE_SHIFT));
+}
+
+/* Is anything hit nearer than `limit`? */
+bool trace_any(vec3 origin, vec3 direction, float limit)
+{
+  return trace_blockers(origin, direction, limit, 0);
 }

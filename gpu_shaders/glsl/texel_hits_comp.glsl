@@ -40,6 +40,7 @@ void main()
   vec4 seen = texelFetch(geometry, at, 0);
   vec4 hit = vec4(0.0, 0.0, 0.0, -1.0);
   int sheet = 0;
+  bool on_surface = false;
   if (seen.z < NO_SURFACE && texelFetch(albedo, at, 0).rgb != vec3(0.0)) {
     vec3 direction = texel_direction(id.xy);
     vec3 point = element(probe_slots, first_slot + id.z).xyz + direction * abs(seen.z);
@@ -47,8 +48,9 @@ void main()
     hit.w = pack_normal(seen.xy);
 #ifdef HAS_SHEETS
     sheet = sheet_of_triangle(int(seen.w));
+    on_surface = share_of_back(sheet) != vec3(0.0);
 #endif
-    hit.xyz = sheet > 0 ? hit.xyz : pull_back(hit.xyz, direction, abs(seen.z));
+    hit.xyz = on_surface ? hit.xyz : pull_back(hit.xyz, direction, abs(seen.z));
   }
   ivec2 place = element_position((id.z * 6 * FACE + id.y) * FACE + id.x);
   imageStore(hits, place, hit);

@@ -96,6 +96,9 @@ vec3 shade_surface(Surface surface, int triangle, vec3 direction, float distance
     return vec3(0.0);
   }
 #endif
+#ifdef HAS_LINKS
+  lit_role = role_of_triangle(triangle);
+#endif
   vec3 radiance = side_radiance(surface, direction, -direction, distance, key, index);
 #ifdef HAS_SHEETS
   vec3 through = share_of_back(sheet_of_triangle(triangle));

@@ -158,3 +158,17 @@ def test_nodes_that_differ_with_direction(scene, kind):
     factors = snapshot.lights[0].profile.factor(sides, np.ones(2))
     assert factors[0] == pytest.approx(np.array([1, 0.5, 0.25]), rel=0.01) and not factors[1].any()
     assert blocks == (len(bpy.data.scenes), len(bpy.data.lights), len(bpy.data.meshes))
+
+
+def test_a_sheared_spot_shines_along_its_own_coordinates(scene):
+    """A child turned under a parent that stretches: where the cone's axis is, x and y of the object are 0."""
+    parent = place(None, "Parent", scale=(3, 1, 1))
+    spot = place(bpy.data.lights.new("Spot", "SPOT"), "Spot", parent=parent, rotation_euler=(0.3, 0.8, 0.2))
+    bpy.context.view_layer.update()
+    light = read_scene(scene).lights[0]
+    matrix = np.array(spot.matrix_world)[:3, :3]
+    for direction in np.random.default_rng(1).normal(size=(5, 3)):
+        expected = np.linalg.solve(matrix, direction)
+        frame, scale = light.matrix[:3, :3], np.array(light.spot_scale)
+        found = direction @ frame * (scale[2] / scale)
+        np.testing.assert_allclose(found / np.linalg.norm(found), expected / np.linalg.norm(expected), atol=1e-6)

@@ -31,8 +31,15 @@ def test_in_the_dark_rooms_are_not_taken_for_solids():
 
 def test_inside_a_solid():
     """Shares of back faces of solids, background, lit, all back faces."""
-    shares = np.array([[0.6, 0, 0, 0.6], [0.4, 0, 0.5, 0.4], [0.0, 0, 0, 0.9], [0.0, 0.2, 0, 0.8], [0.0, 0, 0.1, 0.9]])
+    shares = np.array([[0.6, 0, 0, 0.6], [0.4, 0, 0.5, 0.4], [0.0, 0, 0, 0.9], [0.0, 0.2, 0, 0.7], [0.0, 0, 0.1, 0.9]])
     np.testing.assert_array_equal(inside_solid(shares), [True, False, True, False, False])
+
+
+def test_in_the_void_behind_walls():
+    """Under a black world nothing but back faces and background is in sight; a front or light make it a place."""
+    shares = np.array([[0.0, 0.8, 0, 0.2], [0.0, 0.7, 0, 0.2], [0.0, 0.8, 0.5, 0.2], [0.0, 1.0, 0, 0.0]])
+    np.testing.assert_array_equal(inside_solid(shares), [True, False, False, False])
+    assert not inside_solid(shares[:2]).any(), "nothing is lit at all"
 
 
 def test_a_scene_without_light_has_no_insides():
