@@ -49,6 +49,14 @@ class LinkRoles:
     def groups(self) -> int:
         return self.lit.shape[1] - 1
 
+    def rows(self) -> np.ndarray:
+        """(R·(G + 1), 4) elements of ray_lib's links: whether the light falls on a role, is blocked by it, passes any;
+        the first of a role its own group instead."""
+        rows = np.zeros((*self.lit.shape, 4), np.float32)
+        rows[..., 0], rows[..., 1], rows[..., 2] = self.lit, self.blocks, ~self.blocks.all(axis=0)
+        rows[:, 0, 0] = self.group
+        return rows.reshape(-1, 4)
+
 
 def link_roles(links: Sequence[Links]) -> LinkRoles:
     """The roles of surfaces with ``links`` (M,); at least one surface is assumed where there is none.

@@ -36,7 +36,7 @@ from .reference_scene import ReferenceScene, Surfaces
 from .sampling import keys_of, sample_r2
 from .settings import BakeSettings
 from .sheets import off_surface
-from .snapshot import SceneSnapshot
+from .snapshot import DIFFUSE_RAYS, SceneSnapshot
 from .world_map import world_texels
 from .world_suns import PROBE_RAYS, extract_suns
 
@@ -76,6 +76,9 @@ class ReferenceBake:
         missed = hits.triangle < 0
         background = world_texels(extract_suns(self.snapshot.world)[0], self.settings.face).reshape(-1, 3)
         flat.emission[missed] = np.tile(background, (shape[0], 1))[missed]
+        tint = self.scene.tint(origins, directions, np.where(missed, np.inf, hits.distance), DIFFUSE_RAYS)
+        flat.albedo *= tint
+        flat.emission *= tint
         return Surfaces(*(value.reshape(*shape, *value.shape[1:]) for value in vars(flat).values()))
 
     def points(self, surfaces: Surfaces) -> np.ndarray:
@@ -198,7 +201,8 @@ class ReferenceBake:
             keys = np.repeat(keys_of(self.nodes, _SUN_STREAM + number, self.settings.seed), PROBE_RAYS, axis=0)
             sample = sample_light(sun, origins, sample_r2(keys, np.tile(index, count)).astype(float))
             seen = self.scene.visible(origins, sample.directions, sample.distances)
-            flux = (sample.irradiance * seen[:, None] / PROBE_RAYS).reshape(count, PROBE_RAYS, 3)
+            tint = self.scene.tint(origins, sample.directions, sample.distances)
+            flux = (sample.irradiance * tint * seen[:, None] / PROBE_RAYS).reshape(count, PROBE_RAYS, 3)
             basis = sh.basis(sample.directions, self.settings.bands).reshape(count, PROBE_RAYS, -1)
             result += np.einsum("prk,prc->pkc", basis, flux)
         return result

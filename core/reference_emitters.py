@@ -15,6 +15,7 @@ from .emitters import CANDIDATES, PROBE_POINTS, PROBE_RAYS, reach
 from .reference_scene import ReferenceScene, Surfaces
 from .sampling import keys_of, sample_cosine, sample_r2, sample_r3, shifted
 from .settings import BakeSettings
+from .snapshot import DIFFUSE_RAYS
 
 _LEAST_COSINE = 1e-4  # between an emitter and the way to a probe
 _SHADOW_END = 0.9999  # of the distance to the emitter
@@ -151,7 +152,9 @@ class ReferenceEmitters:
             visible[mine] = self.scene.visible(origins[lit[mine]], way[mine] / length[mine, None], ends, group)
         lit = lit[visible]
         result = np.zeros_like(points)
-        result[lit] = best.irradiance[lit] * (total[lit] / (best_weight[lit] * CANDIDATES))[:, None]
+        way, length = way[visible], length[visible]
+        tint = self.scene.tint(origins[lit], way / length[:, None], length * _SHADOW_END)
+        result[lit] = best.irradiance[lit] * (total[lit] / (best_weight[lit] * CANDIDATES))[:, None] * tint
         return result
 
     def by_directions(self, origins: np.ndarray, normals: np.ndarray, keys: np.ndarray, index, role) -> np.ndarray:
@@ -176,7 +179,8 @@ class ReferenceEmitters:
         )
         result = np.zeros_like(origins)
         radiance = self.scene.emission(triangle, hits.barycentric[found])
-        result[found] = radiance * ((1.0 - share) * np.pi)[:, None]
+        tint = self.scene.tint(origins[found], direction, hits.distance[found], DIFFUSE_RAYS)
+        result[found] = radiance * ((1.0 - share) * np.pi)[:, None] * tint
         return result
 
     # At probes
@@ -219,4 +223,7 @@ class ReferenceEmitters:
         origins = np.broadcast_to(position, (len(sent), 3))
         sent = sent[self.scene.visible(origins, direction[sent], distance[sent] * _SHADOW_END)]
         flux = radiance[sent] * (rays[sent] * step / weight[sent])[:, None]
+        flux *= self.scene.tint(
+            np.broadcast_to(position, (len(sent), 3)), direction[sent], distance[sent] * _SHADOW_END
+        )
         return SeenPoints(direction[sent], distance[sent], emitter.normal[sent], flux)

@@ -40,7 +40,7 @@ from .reference_scene import ReferenceScene
 from .sampling import keys_of, light_keys, pcg3d, sample_cosine, sample_r2, shifted
 from .settings import BakeSettings
 from .sheets import off_surface, side_weight
-from .snapshot import Light
+from .snapshot import DIFFUSE_RAYS, Light
 from .world_map import world_texels
 from .world_suns import extract_suns
 
@@ -230,8 +230,15 @@ class ReferenceLight:
         first, stop = part if isinstance(part, tuple) else (0, None)
         for number, light in list(enumerate(self._all_lamps()))[first:stop]:
             u = sample_r2(light_keys(keys, number), index).astype(float)
-            visible = partial(self.scene.visible, group=light.link_group) if shadows else _always
+            visible = (
+                partial(self.scene.visible, group=light.link_group)
+                if shadows
+                else lambda origins, *_: np.ones(len(origins), bool)
+            )
             light_there = direct_light.irradiance(light, point + self.scene.origin, origin, normal, u, visible)
+            if shadows and light.casts_shadow:
+                way = direct_light.sample_light(light, point + self.scene.origin, u)
+                light_there *= self.scene.tint(origin, way.directions, way.distances, group=light.link_group)
             total += np.where(self.scene.falls_on(light.link_group, role)[:, None], light_there, 0.0)
         return total
 
@@ -269,6 +276,7 @@ class ReferenceLight:
             found = self.scene.closest(origin[alive], direction)
             surface = self.scene.resolve(found, direction, _RAY_SPREAD)
             missed = found.triangle < 0
+            reflected[alive] *= self.scene.tint(origin[alive], direction, found.distance, DIFFUSE_RAYS)
             face, row, column = direction_to_texel(direction, self.settings.face)
             background = self._world[(face * self.settings.face + row) * self.settings.face + column]
             unlit = ~self.scene.falls_on(self.scene.links.group[self.scene.role[found.triangle]], role[alive])
@@ -373,10 +381,6 @@ def bounce(
     coming = np.where((ends >= 0)[..., None], reflected * irradiance[np.maximum(ends, 0)], 0.0)
     counted = np.maximum((ends != NO_PATCH).sum(axis=1), 1)
     return direct + brought + coming.sum(axis=1) / counted[:, None]
-
-
-def _always(origins: np.ndarray, _directions: np.ndarray, _limits: np.ndarray) -> np.ndarray:
-    return np.ones(len(origins), bool)
 
 
 def _split(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

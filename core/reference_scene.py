@@ -58,19 +58,50 @@ class ReferenceScene:
         """(N,) bool: does light of ``group`` fall on surfaces of ``role`` (N,)?"""
         return self.links.lit[role, np.where(np.asarray(group) <= self.links.groups, group, 0)]
 
-    def _hole_test(self, kind: int, group: int = 0):
-        """What rays of a kind pass through on their way to emitters of ``group``; None for nothing."""
+    def tint(
+        self, origins: np.ndarray, directions: np.ndarray, limits: np.ndarray, kind: int = SHADOW_RAYS, group: int = 0
+    ) -> np.ndarray:
+        """(N, 3) what coloured holes nearer than ``limits`` (N,) leave of light along rays of a ``kind``, which hit
+        nothing else before."""
+        result = np.ones((len(origins), 3))
+        passes = self._passed_by(kind, group)
+        tinted = np.array([material.is_tinted for material in self.snapshot.materials])[self.snapshot.material_index]
+        for number in np.flatnonzero(tinted):
+            corners = np.broadcast_to(self.triangles[number], (len(origins), 3, 3))
+            distance, barycentric = rays.intersect(corners, origins, directions)
+            met = np.flatnonzero((distance > 0) & (distance < limits))
+            triangle = np.full(len(met), number)
+            met = met[self.is_hole(triangle, barycentric[met]) & ~passes(triangle, directions[met])]
+            material = self.snapshot.materials[self.snapshot.material_index[number]]
+            result[met] *= material.tint
+            if material.tint_image != NO_IMAGE:
+                result[met] *= self._image(material.tint_image, np.full(len(met), number), barycentric[met])[:, :3]
+        return result
+
+    def _passed_by(self, kind: int, group: int):
+        """Which triangles rays of a kind to emitters of ``group`` do not see along their directions."""
         unseen, one_sided = (self._unseen_by & kind) > 0, (self._unseen_by & FROM_BEHIND) > 0
         if 0 < group <= self.links.groups:
             unseen = unseen | ~self.links.blocks[self.role, group]
-        if not (unseen.any() or one_sided.any() or self._clipped.any()):
-            return None
         edge = self.triangles[:, 1:] - self.triangles[:, :1]
         front = np.cross(edge[:, 0], edge[:, 1])
 
-        def is_hole(triangle: np.ndarray, barycentric: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        def passes(triangle: np.ndarray, directions: np.ndarray) -> np.ndarray:
             behind = one_sided[triangle] & (np.einsum("ki,ki->k", front[triangle], directions) > 0)
-            return unseen[triangle] | behind | self.is_hole(triangle, barycentric)
+            return unseen[triangle] | behind
+
+        return (
+            passes if unseen.any() or one_sided.any() else lambda triangle, _directions: np.zeros(len(triangle), bool)
+        )
+
+    def _hole_test(self, kind: int, group: int = 0):
+        """What rays of a kind pass through on their way to emitters of ``group``; None for nothing."""
+        if not (self._unseen_by.any() or self.links.groups or self._clipped.any()):
+            return None
+        passes = self._passed_by(kind, group)
+
+        def is_hole(triangle: np.ndarray, barycentric: np.ndarray, directions: np.ndarray) -> np.ndarray:
+            return passes(triangle, directions) | self.is_hole(triangle, barycentric)
 
         return is_hole
 

@@ -294,6 +294,7 @@ def _material_aspects(materials: list[Material], images: list[int] | None) -> li
             "holes": (m.alpha, m.alpha_threshold, image(m.alpha_image), m.alpha_from_color)
             if m.alpha_threshold > 0
             else (),
+            "tints": (m.tint, image(m.tint_image)) if m.is_tinted else (),
             "visibility": (m.unseen_by, m.links),
             "sheets": m.transmitted if any(m.transmitted) else (),
         }
@@ -305,10 +306,11 @@ _ASPECT_IMAGES = {
     "reflectance": "base_image",
     "emission": "emission_image",
     "holes": "alpha_image",
+    "tints": "tint_image",
     "sheets": "base_image",
     "visibility": None,
 }
-_REBUILDING = ("holes", "sheets", "visibility")  # where these differ, rays and patches find another surface
+_REBUILDING = ("holes", "tints", "sheets", "visibility")  # where these differ, rays and patches find another surface
 
 
 def _triangles_differ(old, new, common, before: list[dict], after: list[dict]) -> dict[str, np.ndarray]:

@@ -56,10 +56,17 @@ class Material:
     alpha_from_color: bool = False  # the alpha input was fed by the colour output: use its mean
     alpha: float = 1.0
     alpha_threshold: float = 0.0
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)  # what holes leave of light that passes, times the tint image
+    tint_image: int = NO_IMAGE
     transmitted: tuple[float, float, float] = (0.0, 0.0, 0.0)
     unseen_by: int = 0  # sum of SHADOW_RAYS, DIFFUSE_RAYS and FROM_BEHIND: for these the surface is not there
     links: Links = UNLINKED  # which emitters' light falls on it, and passes it
     backface_culling: bool = False  # stated only; light transport treats every surface as two-sided, like Cycles
+
+    @property
+    def is_tinted(self) -> bool:
+        """Whether it has holes, and they are coloured."""
+        return self.alpha_threshold > 0 and (self.tint != (1.0, 1.0, 1.0) or self.tint_image != NO_IMAGE)
 
 
 @dataclass(frozen=True)

@@ -41,6 +41,8 @@ def _scene(info, defines: dict, first: int = 0, attributes: bool = True) -> int:
         names += ["triangle_attributes", "materials"]
         if "HAS_IMAGES" in defines:
             names += ["image_table", "image_texels"]
+    if "HAS_TINT" in defines:
+        names.append("tints")
     if "HAS_LINKS" in defines:
         names.append("links")
     return _samplers(info, *names, first=first)
@@ -135,7 +137,8 @@ def surface_resolve_comp(info, defines):
     _image(info, 2, "emission", layered=True)
     _ints(info, "first_slot", "first_layer")
     info.local_group_size(8, 8, 1)
-    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", "surface_lib", "surface_resolve_comp"]}
+    files = ["surface_lib", "offset_lib", "ray_lib", "surface_resolve_comp"]
+    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *files]}
 
 
 def object_sightings_comp(info, defines):

@@ -33,7 +33,8 @@ def surface_again_comp(info, defines):
     _image(info, 3, "rebind", pixel="R32F")
     _ints(info, "first_slot")
     info.local_group_size(8, 8, 1)
-    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", "surface_lib", "surface_again_comp"]}
+    files = ["surface_lib", "offset_lib", "ray_lib", "surface_again_comp"]
+    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *files]}
 
 
 def layers_move_comp(info, defines):

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core import bvh, emitters
 from ..core.errors import InputError
-from ..core.light_links import LinkRoles, link_roles
+from ..core.light_links import link_roles
 from ..core.light_profiles import LightProfile
 from ..core.scene_changes import SceneChanges, ShapeChange, boxes_around
 from ..core.sheets import sheet_numbers
@@ -150,7 +150,7 @@ class SceneTextures:
         """Materials, sheets, emitters, and corners and attributes of all triangles or of those at ``only`` (K,) in leaf
         order."""
         for name, values in self._surface_rows(snapshot, density, slice(None) if only is None else only).items():
-            if only is None or name in ("materials", "sheets", "links", "emitters"):
+            if only is None or name in ("materials", "sheets", "links", "tints", "emitters"):
                 self._textures[name] = upload(values, name.replace("_", " "))
             elif len(only):
                 scatter_rows(self._textures[name], only, values)
@@ -161,7 +161,8 @@ class SceneTextures:
         order = self.hierarchy.order
         clips = np.array([m.alpha_threshold > 0 for m in snapshot.materials] or [False])
         unseen = np.array([m.unseen_by for m in snapshot.materials] or [0])
-        self.has_alpha, self.has_unseen = bool(clips.any()), bool(unseen.any())
+        tinted = np.array([m.is_tinted for m in snapshot.materials] or [False])
+        self.has_alpha, self.has_unseen, self.has_tint = bool(clips.any()), bool(unseen.any()), bool(tinted.any())
         self._links = link_roles([m.links for m in snapshot.materials])
         sheet_of_material, sheets = sheet_numbers(snapshot.materials, self._links.of_surface)
         self.has_sheets = len(sheets) > 1
@@ -174,12 +175,14 @@ class SceneTextures:
         rows[:, :, :3] = corners
         rows[:, 0, 3] = self.hierarchy.leaf_end[at]
         roles = self._links.of_surface[material]
-        rows[:, 1, 3] = clips[material] + 2 * unseen[material] + 16 * roles  # bits, see ray_lib
+        # Bits, see ray_lib.
+        rows[:, 1, 3] = clips[material] + 2 * unseen[material] + 16 * tinted[material] + 32 * roles
         rows[:, 2, 3] = sheet_of_material[material]
         return {
             "materials": _materials(snapshot),
             "sheets": sheets.astype(np.float32),
-            "links": _links(self._links),
+            "links": self._links.rows(),
+            "tints": _tints(snapshot),
             "emitters": _emitters(self._density, self.corners, order),
             "triangle_corners": rows,
             "triangle_attributes": _attributes(snapshot, order[at], material, corners, self._density[at]),
@@ -199,6 +202,7 @@ class SceneTextures:
             "HAS_IMAGES": self.has_images,
             "HAS_UNSEEN": self.has_unseen,
             "HAS_PROFILES": any(profile is not None for profile in self._profiles),
+            "HAS_TINT": self.has_tint,
             "HAS_LINKS": self._links.groups > 0,
             "LINK_GROUPS": self._links.groups or None,
             "STACK_SIZE": stack_size,
@@ -239,6 +243,8 @@ class SceneTextures:
             self.bind(shader, "links")
         if self.has_alpha:
             self.bind(shader, "triangle_attributes", "materials")
+            if self.has_tint:
+                self.bind(shader, "tints")
             if self.has_images:
                 self.bind(shader, "image_table", "image_texels")
 
@@ -271,6 +277,8 @@ class SceneTextures:
     def bind_surfaces(self, shader) -> None:
         """Binds what a shader compiled with ``surface_defines`` declares."""
         self.bind(shader, "bvh_nodes", "triangle_corners", "triangle_attributes", "materials")
+        if self.has_tint:
+            self.bind(shader, "tints")
         if self._links.groups:
             self.bind(shader, "links")
         if self.has_images:
@@ -336,12 +344,9 @@ def _materials(snapshot: SceneSnapshot) -> np.ndarray:
     return rows
 
 
-def _links(roles: LinkRoles) -> np.ndarray:
-    """(R·(G + 1), 4) elements of ray_lib's links."""
-    rows = np.zeros((*roles.lit.shape, 4), np.float32)
-    rows[..., 0], rows[..., 1], rows[..., 2] = roles.lit, roles.blocks, ~roles.blocks.all(axis=0)
-    rows[:, 0, 0] = roles.group
-    return rows.reshape(-1, 4)
+def _tints(snapshot: SceneSnapshot) -> np.ndarray:
+    """(M, 4) elements of surface_lib's tints."""
+    return np.array([(*m.tint, m.tint_image) for m in snapshot.materials] or [(1, 1, 1, -1)], np.float32)
 
 
 def pack_lights(lights: list[Light], origin: np.ndarray) -> np.ndarray:

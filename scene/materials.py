@@ -19,9 +19,9 @@ from .node_links import Unsupported, active_output, find_socket
 from .notices import Notices
 from .procedurals import sampler_of
 from .shader_nodes import NodeEvaluator
-from .shader_values import ONE, Domain, Value, add, apply, constant
+from .shader_values import ONE, ZERO, Domain, Value, add, apply, complement, constant, multiply
 from .surface_parts import SurfaceParts
-from .surface_shaders import DEFAULT_GREY, HOLE, Closure, evaluate_shader
+from .surface_shaders import DEFAULT_GREY, HOLE, WHITE, Closure, evaluate_shader
 from .surface_values import SurfaceEvaluator
 
 _LEAST_OPACITY = 1e-3  # less is no surface, and what misses less than this of 1 is solid
@@ -74,12 +74,14 @@ class MaterialTable:
     def is_hole(self, index: int) -> bool:
         """Whether nothing of the surface is left: light passes everywhere."""
         material = self.materials[index]
-        return material.alpha_image == NO_IMAGE and material.alpha < _LEAST_OPACITY
+        opaque = material.alpha_image != NO_IMAGE or material.alpha >= _LEAST_OPACITY
+        return not (opaque or material.is_tinted)
 
     def is_textured(self, index: int) -> bool:
         """Whether the surface samples any image."""
         material = self.materials[index]
-        return max(material.base_image, material.emission_image, material.alpha_image) != NO_IMAGE
+        images = material.base_image, material.emission_image, material.alpha_image, material.tint_image
+        return max(images) != NO_IMAGE
 
     def _closure(self, material: bpy.types.Material) -> Closure:
         if material.node_tree is None or not material.use_nodes:
@@ -111,7 +113,7 @@ class MaterialTable:
         closure = evaluate_shader(evaluator, surface)
         placed = {
             value.domain
-            for value in (closure.diffuse, closure.through, closure.opacity, closure.emission)
+            for value in (closure.diffuse, closure.through, closure.opacity, closure.emission, closure.tint)
             if not value.is_constant
         }
         samples = None
@@ -136,17 +138,25 @@ class MaterialTable:
         return front
 
     def _append(self, name: str, closure: Closure, backface_culling: bool) -> None:
-        opacity = _solid_where_opaque(closure.opacity)
         sent_back, transmitted = self._sent_back(name, closure)
+        opacity, tint = _solid_where_opaque(closure.opacity), _white_where_clear(closure.tint)
+        if tint is not WHITE and sent_back.is_zero() and closure.emission.is_zero():
+            # What is black where it is no hole lets all light through, and leaves less of it.
+            opacity, tint = ZERO, multiply(tint, complement(opacity))
         placed = [
             value
-            for value in (sent_back, opacity, closure.emission)
+            for value in (sent_back, opacity, closure.emission, tint)
             if not value.is_constant and value.domain.uv_map is not None
         ]
         domain = placed[0].domain if placed else Domain()
-        diffuse, opacity, emission = (
+        diffuse, opacity, emission, tint = (
             self._in_domain(name, role, value, domain)
-            for role, value in (("base colour", sent_back), ("alpha", opacity), ("emission", closure.emission))
+            for role, value in (
+                ("base colour", sent_back),
+                ("alpha", opacity),
+                ("emission", closure.emission),
+                ("transparency", tint),
+            )
         )
         if opacity.is_constant and opacity.number() < _LEAST_OPACITY and not emission.is_zero():
             self._notices.group("emission on a transparent surface is kept and the surface blocks light", name)
@@ -166,6 +176,8 @@ class MaterialTable:
                 emission_image=NO_IMAGE if emission.is_constant else self._add(f"{name} emission", emission, None),
                 alpha=opacity.number() if opacity.is_constant else 1.0,
                 alpha_threshold=0.0 if opacity.is_constant and opacity.number() > 1 - _LEAST_OPACITY else DITHERED,
+                tint=_color(tint),
+                tint_image=NO_IMAGE if tint.is_constant else self._add(f"{name} tint", tint, None),
                 transmitted=transmitted,
                 unseen_by=FROM_BEHIND if closure.one_sided else 0,
                 backface_culling=backface_culling,
@@ -237,6 +249,11 @@ def _solid_where_opaque(opacity: Value) -> Value:
     if not opacity.is_constant and float(opacity.array().min()) > 1 - _LEAST_OPACITY:
         return ONE
     return opacity
+
+
+def _white_where_clear(tint: Value) -> Value:
+    """White for holes that colour nothing, so that nobody asks them."""
+    return WHITE if float(tint.array().min()) > 1 - _LEAST_OPACITY else tint
 
 
 def _color(value: Value) -> tuple[float, float, float]:

@@ -9,8 +9,8 @@ to Cycles as a diffuse reflector with holes can be:
   warning says where it matters. Black instead left a room with metal walls 70 % too dark, this is 3 % too
   bright.
 - Translucent lets light through diffusely: what arrives on one side leaves on the other.
-- Glass, Refraction and the transmitting part of Principled let light through unbent and uncoloured: a hole. Thin panes
-  are what such materials mostly are, and caustics of solid glass are beyond a light probe.
+- Transparent, Glass, Refraction and the transmitting part of Principled let light through unbent: a hole, which may be
+  coloured. Thin panes are what such materials mostly are, and caustics of solid glass are beyond a light probe.
 - Mix Shader and Add Shader combine these per pixel. Normal inputs are ignored; they turn light, they do not make it.
 """
 
@@ -35,18 +35,22 @@ from .shader_nodes import NodeEvaluator
 from .shader_values import ONE, ZERO, Value, add, apply, blend, complement, constant, multiply
 
 DEFAULT_GREY = constant([0.8, 0.8, 0.8])
+WHITE = constant([1.0, 1.0, 1.0])
+_GREY = 0.02  # difference of channels up to which transparency counts as grey: part hole, part black
 
 
 @dataclass(frozen=True)
 class Closure:
     """``diffuse`` is the albedo of the part that is not hole, ``through`` what that part lets through diffusely,
-    ``opacity`` its share of the whole, ``emission`` radiance of the whole.
+    ``opacity`` its share of the whole, ``emission`` radiance of the whole, ``tint`` what the hole leaves of light that
+    passes it.
     """
 
     diffuse: Value = constant([0.0, 0.0, 0.0])
     opacity: Value = ONE
     emission: Value = constant([0.0, 0.0, 0.0])
     through: Value = constant([0.0, 0.0, 0.0])
+    tint: Value = WHITE
     one_sided: bool = False  # from behind nothing is there
 
 
@@ -93,10 +97,14 @@ def _principled(evaluator, node, scope):
     if not metallic.is_zero():
         evaluator.notices.group("metal reflects its colour in all directions", evaluator.owner_name)
         albedo = blend(metallic, albedo, metal_albedo(value("Base Color"), roughness))
-    opacity = _unit(value("Alpha"))
+    opacity, tint = _unit(value("Alpha")), WHITE
     if not through.is_zero():
-        evaluator.notices.group("glass lets light through unbent and uncoloured", evaluator.owner_name)
-        opacity = apply(lambda a, t, m: a * (1 - t * (1 - m)), opacity, through, metallic)
+        evaluator.notices.group("glass lets light through unbent", evaluator.owner_name)
+        alpha = opacity
+        opacity = apply(lambda a, t, m: a * (1 - t * (1 - m)), alpha, through, metallic)
+        # Two faces of a solid take the root of its colour each.
+        glass = apply(lambda color: np.sqrt(np.clip(color, 0, 1)), value("Base Color"))
+        tint = _mixed_tint(complement(alpha), WHITE, apply(np.subtract, alpha, opacity), glass)
     coat = _unit(value("Coat Weight"))
     if not coat.is_zero():
         share = coat.number() * dielectric_albedo(value("Coat IOR").number(), value("Coat Roughness").number())
@@ -107,7 +115,7 @@ def _principled(evaluator, node, scope):
         albedo = layered(value("Sheen Tint").scaled(share), share, albedo)
     strength = value("Emission Strength")
     emission = Closure.emission if strength.is_zero() else multiply(value("Emission Color"), strength)
-    return Closure(albedo, opacity, emission)
+    return Closure(albedo, opacity, emission, tint=tint)
 
 
 def _unit(value: Value) -> Value:
@@ -154,15 +162,18 @@ def _translucent(evaluator, node, scope):
 
 
 def _glass(evaluator, node, scope):
-    evaluator.notices.group("glass lets light through unbent and uncoloured", evaluator.owner_name)
-    return HOLE
+    evaluator.notices.group("glass lets light through unbent", evaluator.owner_name)
+    return Closure(opacity=ZERO, tint=_unit(evaluator.input(node, "Color", scope)))
 
 
 def _transparent(evaluator, node, scope):
-    color = evaluator.input(node, "Color", scope)
-    if color.is_constant and np.ptp(color.rgb()) > 0.05:
-        evaluator.notices.group("coloured transparency is not supported: what passes stays white", evaluator.owner_name)
-    return Closure(opacity=apply(lambda rgb: 1 - rgb.mean(axis=-1, keepdims=True), color))
+    color = _unit(evaluator.input(node, "Color", scope))
+    if float(np.ptp(np.broadcast_to(color.array(), (*color.array().shape[:-1], 3)), axis=-1).max()) <= _GREY:
+        return Closure(opacity=apply(lambda rgb: 1 - rgb.mean(axis=-1, keepdims=True), color))
+    return Closure(
+        opacity=apply(lambda rgb: 1 - rgb.max(axis=-1, keepdims=True), color),
+        tint=apply(lambda rgb: rgb / np.maximum(rgb.max(axis=-1, keepdims=True), 1e-6), color),
+    )
 
 
 def _emission(evaluator, node, scope):
@@ -189,7 +200,27 @@ def _mix(evaluator, node, scope):
         blend(factor, first.opacity, second.opacity),
         blend(factor, first.emission, second.emission),
         _opaque_mix(factor, first.opacity, second.opacity, first.through, second.through),
+        _mixed_tint(
+            apply(lambda f, o: (1 - o) * (1 - f), factor, first.opacity),
+            first.tint,
+            apply(lambda f, o: (1 - o) * f, factor, second.opacity),
+            second.tint,
+        ),
     )
+
+
+def _mixed_tint(share: Value, tint: Value, other_share: Value, other_tint: Value) -> Value:
+    """Colour of two holes together, which take these shares of the area."""
+    if tint is other_tint or other_share.is_zero():
+        return tint
+    if share.is_zero():
+        return other_tint
+
+    def weighted(a, color, b, other):
+        total = a + b
+        return (a * color + b * other) / np.where(total > 0, total, 1)
+
+    return apply(weighted, share, tint, other_share, other_tint)
 
 
 def _opaque_mix(factor: Value, opacity: Value, other_opacity: Value, color: Value, other_color: Value) -> Value:
@@ -229,7 +260,8 @@ def _add(evaluator, node, scope):
         )
 
     diffuse, through = (of_opaque(getattr(first, name), getattr(second, name)) for name in ("diffuse", "through"))
-    return Closure(diffuse, opacity, emission, through)
+    tint = _mixed_tint(complement(first.opacity), first.tint, complement(second.opacity), second.tint)
+    return Closure(diffuse, opacity, emission, through, tint)
 
 
 _SHADERS = {

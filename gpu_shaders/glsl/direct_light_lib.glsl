@@ -172,10 +172,8 @@ vec3 light_irradiance(int light, vec3 point, vec3 origin, vec3 normal, vec2 u)
   }
 #endif
   bool shadow = (int(element(lights, 6 * light + 4).w) & 1) != 0;
-  if (shadow && trace_blockers(origin, light_sample.direction, light_sample.distance * 0.9999, group)) {
-    return vec3(0.0);
-  }
-  return light_sample.irradiance * cosine;
+  vec3 arriving = shadow ? light_along(origin, light_sample.direction, light_sample.distance * 0.9999, group) : vec3(1.0);
+  return light_sample.irradiance * cosine * arriving;
 }
 
 /* Irradiance of all lamps: sample `index` of the sequences of `key`. */

@@ -96,8 +96,9 @@ void main()
       break;
     }
     Candidate chosen = candidate(slot.xyz, key, lane * RUN + i - 1);
-    if (!trace_any(slot.xyz, chosen.direction, chosen.distance * 0.9999)) {
-      vec3 flux = chosen.radiance * (rays * step / chosen.weight);
+    vec3 arriving = light_along(slot.xyz, chosen.direction, chosen.distance * 0.9999, 0);
+    if (arriving != vec3(0.0)) {
+      vec3 flux = chosen.radiance * (rays * step / chosen.weight) * arriving;
       sh_basis(chosen.direction, basis);
       for (int c = 0; c < COEFFICIENTS; c++) {
         sum[c] += flux * basis[c];

@@ -127,10 +127,8 @@ vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, 
   /* From where the ray starts, which is not `point`: to an emitter a few centimetres away it would be too long and meet the emitter itself. */
   vec3 way = best_point - origin;
   float way_length = max(length(way), 1.0e-20);
-  if (trace_blockers(origin, way / way_length, way_length * 0.9999, best_group)) {
-    return vec3(0.0);
-  }
-  return best_irradiance * (total / (best_weight * float(CANDIDATES)));
+  vec3 arriving = light_along(origin, way / way_length, way_length * 0.9999, best_group);
+  return best_irradiance * (total / (best_weight * float(CANDIDATES))) * arriving;
 }
 
 bool is_emitter_in_reach(vec3 point)
@@ -171,7 +169,8 @@ vec3 emitter_direction_irradiance(vec3 origin, vec3 normal, uvec3 key, int index
   vec3 across = cross(element(triangle_corners, 3 * hit.triangle + 1).xyz - a,
                       element(triangle_corners, 3 * hit.triangle + 2).xyz - a);
   float share = point_share(group, density, hit.distance, dot(direction, normal), abs(dot(direction, normalize(across))));
-  return emitter_radiance(hit.triangle, hit.barycentric) * ((1.0 - share) * 3.141592653589793);
+  return emitter_radiance(hit.triangle, hit.barycentric) * ((1.0 - share) * 3.141592653589793) *
+         passed_to(origin, direction, hit.distance);
 }
 
 /* Irradiance of all sampled emitters at a surface: sample `index` of the sequences of `key`. */

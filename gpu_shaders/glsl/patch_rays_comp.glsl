@@ -48,6 +48,7 @@ void main()
   for (int segment = 0; segment < SEGMENTS && throughput != vec3(0.0); segment++) {
     vec3 direction = sample_cosine(normal, sample_r2(key + uvec3(0u, uint(segment), 0u), number));
     Hit hit = trace_closest(origin, direction);
+    throughput *= passed_to(origin, direction, hit.distance);
     if (hit.triangle < 0) {
       ivec2 texel = direction_texel(direction);
       brought += throughput * element(world_texels, texel.y * FACE + texel.x).rgb;

@@ -50,8 +50,8 @@ void main()
   float cosine = abs(dot(towards, emitter.normal));
   flux = emitter.radiance * (cosine / (emitter.density * distance * distance) *
                              share_of_points(emitter.density, distance, cosine));
-  if (flux != vec3(0.0) && trace_any(start, towards, distance * 0.9999)) {
-    flux = vec3(0.0);
+  if (flux != vec3(0.0)) {
+    flux *= light_along(start, towards, distance * 0.9999, 0);
   }
 #endif
   store(entry, 1, towards, 0.0, flux);
@@ -62,7 +62,7 @@ void main()
     int sun = first_sun + number % suns;
     LightSample light_sample = sample_light(sun, start, sample_r2(key + uvec3(0u, 2u, 0u), number));
     towards = light_sample.direction;
-    flux = trace_any(start, towards, NO_HIT) ? vec3(0.0) : light_sample.irradiance * float(suns);
+    flux = light_sample.irradiance * float(suns) * light_along(start, towards, NO_HIT, 0);
   }
   store(entry, 2, towards, 0.0, flux);
 
@@ -73,6 +73,7 @@ void main()
   float behind = 0.0;
   for (int segment = 0; segment <= bounces; segment++) {
     Hit hit = trace_closest(origin, direction);
+    throughput *= passed_to(origin, direction, hit.distance);
     if (hit.triangle < 0) {
       ivec2 texel = direction_texel(direction);
       radiance += throughput * element(world_texels, texel.y * FACE + texel.x).rgb;
@@ -92,7 +93,7 @@ void main()
       vec3 across = cross(element(triangle_corners, 3 * hit.triangle + 1).xyz - a,
                           element(triangle_corners, 3 * hit.triangle + 2).xyz - a);
       float cosine = abs(dot(direction, normalize(across)));
-      radiance += surface.emission * (1.0 - share_of_points(surface.emitter_density, hit.distance, cosine));
+      radiance += throughput * surface.emission * (1.0 - share_of_points(surface.emitter_density, hit.distance, cosine));
     }
     behind = segment == 0 && surface.back ? 1.0 : behind;
     throughput *= surface.albedo;

@@ -6,7 +6,7 @@
  * otherwise. The triangle test is watertight: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection",
  * JCGT 2013. Both sides of a triangle are hit. With HAS_ALPHA, triangles of clipped materials ask surface_lib's
  * `is_hole` first; with HAS_UNSEEN, rays pass triangles that their kind does not see; with HAS_LINKS, shadow rays to an emitter those that
- * are none of its blockers.
+ * are none of its blockers. With HAS_TINT holes may be coloured: what hits or misses is the same, and what light has passed is asked afterwards.
  *
  * Samplers: bvh_nodes, triangle_corners.
  */
@@ -14,8 +14,8 @@
 const float NO_HIT = 3.0e38;
 const int NO_NODE = -2147483647; /* in place of a node or leaf */
 const int CLIPPED = 1, UNSEEN_BY_SHADOW_RAYS = 2, UNSEEN_BY_DIFFUSE_RAYS = 4,
-          UNSEEN_FROM_BEHIND = 8; /* bits of a triangle, w of its corner 1 */
-const int ROLE_SHIFT = 4; /* a triangle's role in light linking is what stands above its other bits */
+          UNSEEN_FROM_BEHIND = 8, TINTED = 16; /* bits of a triangle, w of its corner 1 */
+const int ROLE_SHIFT = 5; /* a triangle's role in light linking is what stands above its other bits */
 
 #ifdef HAS_LINKS
 /* Light linking, see core/light_links.py. links, LINK_GROUPS + 1 elements a role: group of its own emission; then for each group whether its light
@@ -114,14 +114,9 @@ bool starts_on(Ray ray, vec3 a, vec3 b, vec3 c)
   return rounding > 0.0 && abs(dot(normalize(cross(b - a, c - a)), a)) < rounding;
 }
 
-/* Tests triangle `index`; on a hit nearer than hit.distance replaces it. Returns true where its leaf ends. `unseen`: the bit of triangles
- * that the ray passes,
- * and above ROLE_SHIFT the group of emitters that it goes to. */
-bool intersect_triangle(Ray ray, int index, int unseen, inout Hit hit)
+/* Where a ray meets a triangle, nearer than `limit`: distance and weights of corners 1 and 2. */
+bool meets(Ray ray, vec4 corner, vec4 corner1, vec4 corner2, float limit, out float distance, out vec2 barycentric)
 {
-  vec4 corner = element(triangle_corners, 3 * index);
-  vec4 corner1 = element(triangle_corners, 3 * index + 1);
-  vec4 corner2 = element(triangle_corners, 3 * index + 2);
   vec3 a = permute(corner.xyz - ray.origin, ray.axis);
   vec3 b = permute(corner1.xyz - ray.origin, ray.axis);
   vec3 c = permute(corner2.xyz - ray.origin, ray.axis);
@@ -133,35 +128,56 @@ bool intersect_triangle(Ray ray, int index, int unseen, inout Hit hit)
   EXACT float w = pb.x * pa.y - pb.y * pa.x;
   bool miss = min(u, min(v, w)) < 0.0 && max(u, max(v, w)) > 0.0;
   float determinant = u + v + w;
-  if (!miss && determinant != 0.0) {
-    float distance = (u * a.z + v * b.z + w * c.z) * ray.shear.z / determinant;
-    if (distance > 0.0 && distance < hit.distance &&
-        !starts_on(ray, corner.xyz - ray.origin, corner1.xyz - ray.origin, corner2.xyz - ray.origin)) {
-      vec2 barycentric = vec2(v, w) / determinant;
+  if (miss || determinant == 0.0) {
+    return false;
+  }
+  distance = (u * a.z + v * b.z + w * c.z) * ray.shear.z / determinant;
+  barycentric = vec2(v, w) / determinant;
+  return distance > 0.0 && distance < limit &&
+         !starts_on(ray, corner.xyz - ray.origin, corner1.xyz - ray.origin, corner2.xyz - ray.origin);
+}
+
+/* Does the ray pass a triangle because of its kind (`unseen`, as for intersect_triangle)? */
+bool is_unseen(Ray ray, vec4 corner, vec4 corner1, vec4 corner2, int unseen)
+{
 #if defined(HAS_UNSEEN) || defined(HAS_LINKS)
-      int flags = int(corner1.w);
+  int flags = int(corner1.w);
 #endif
 #ifdef HAS_LINKS
-      if (!is_blocked_by(unseen >> ROLE_SHIFT, flags >> ROLE_SHIFT)) {
-        return corner.w != 0.0;
-      }
+  if (!is_blocked_by(unseen >> ROLE_SHIFT, flags >> ROLE_SHIFT)) {
+    return true;
+  }
 #endif
 #ifdef HAS_UNSEEN
-      if ((flags & unseen) != 0 ||
-          ((flags & UNSEEN_FROM_BEHIND) != 0 &&
-           dot(cross(corner1.xyz - corner.xyz, corner2.xyz - corner.xyz), ray.direction) > 0.0)) {
-        return corner.w != 0.0;
-      }
+  if ((flags & unseen) != 0 ||
+      ((flags & UNSEEN_FROM_BEHIND) != 0 &&
+       dot(cross(corner1.xyz - corner.xyz, corner2.xyz - corner.xyz), ray.direction) > 0.0)) {
+    return true;
+  }
 #endif
+  return false;
+}
+
+/* Tests triangle `index`; on a hit nearer than hit.distance replaces it. Returns true where its leaf ends. `unseen`: the bit of triangles
+ * that the ray passes,
+ * and above ROLE_SHIFT the group of emitters that it goes to. */
+bool intersect_triangle(Ray ray, int index, int unseen, inout Hit hit)
+{
+  vec4 corner = element(triangle_corners, 3 * index);
+  vec4 corner1 = element(triangle_corners, 3 * index + 1);
+  vec4 corner2 = element(triangle_corners, 3 * index + 2);
+  float distance;
+  vec2 barycentric;
+  if (meets(ray, corner, corner1, corner2, hit.distance, distance, barycentric) &&
+      !is_unseen(ray, corner, corner1, corner2, unseen)) {
 #ifdef HAS_ALPHA
-      if ((int(corner1.w) & CLIPPED) != 0 && is_hole(index, barycentric)) {
-        return corner.w != 0.0;
-      }
-#endif
-      hit.distance = distance;
-      hit.triangle = index;
-      hit.barycentric = barycentric;
+    if ((int(corner1.w) & CLIPPED) != 0 && is_hole(index, barycentric)) {
+      return corner.w != 0.0;
     }
+#endif
+    hit.distance = distance;
+    hit.triangle = index;
+    hit.barycentric = barycentric;
   }
   return corner.w != 0.0;
 }
@@ -300,4 +316,79 @@ bool trace_blockers(vec3 origin, vec3 direction, float limit, int group)
 bool trace_any(vec3 origin, vec3 direction, float limit)
 {
   return trace_blockers(origin, direction, limit, 0);
+}
+
+#ifdef HAS_TINT
+/* What coloured holes nearer than `limit` leave of light along a ray that is of the kind `unseen` and hits nothing else before. */
+vec3 tint_along(vec3 origin, vec3 direction, float limit, int unseen)
+{
+  Ray ray = make_ray(origin, direction);
+  vec3 tint = vec3(1.0);
+  int stack[STACK_SIZE];
+  int top = 0;
+  int item = 0;
+  while (true) {
+    while (item >= 0) {
+      vec4 entry = enter_boxes(ray, item, limit);
+      vec4 child = element(bvh_nodes, item * 7 + 6);
+      item = NO_NODE;
+      for (int i = 0; i < 4; i++) {
+        if (entry[i] < NO_HIT) {
+          if (item != NO_NODE) {
+            stack[top++] = item;
+          }
+          item = int(child[i]);
+        }
+      }
+      if (item == NO_NODE) {
+        if (top == 0) {
+          return tint;
+        }
+        item = stack[--top];
+      }
+    }
+    int index = -1 - item;
+    bool ends = false;
+    while (!ends) {
+      vec4 corner = element(triangle_corners, 3 * index);
+      vec4 corner1 = element(triangle_corners, 3 * index + 1);
+      vec4 corner2 = element(triangle_corners, 3 * index + 2);
+      float distance;
+      vec2 barycentric;
+      if ((int(corner1.w) & TINTED) != 0 && meets(ray, corner, corner1, corner2, limit, distance, barycentric) &&
+          !is_unseen(ray, corner, corner1, corner2, unseen) && is_hole(index, barycentric)) {
+        tint *= hole_tint(index, barycentric);
+      }
+      ends = corner.w != 0.0;
+      index++;
+    }
+    if (top == 0) {
+      return tint;
+    }
+    item = stack[--top];
+  }
+}
+#endif
+
+/* What arrives of light that nothing else hits along a ray as far as `limit`: all, but for coloured holes. */
+vec3 passed_to(vec3 origin, vec3 direction, float limit)
+{
+#ifdef HAS_TINT
+  return tint_along(origin, direction, limit, UNSEEN_BY_DIFFUSE_RAYS);
+#else
+  return vec3(1.0);
+#endif
+}
+
+/* What arrives along a ray to an emitter of a group of light linking, `limit` away. */
+vec3 light_along(vec3 origin, vec3 direction, float limit, int group)
+{
+  if (trace_blockers(origin, direction, limit, group)) {
+    return vec3(0.0);
+  }
+#ifdef HAS_TINT
+  return tint_along(origin, direction, limit, UNSEEN_BY_SHADOW_RAYS | (group << ROLE_SHIFT));
+#else
+  return vec3(1.0);
+#endif
 }

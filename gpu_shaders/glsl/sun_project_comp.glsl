@@ -18,10 +18,11 @@ void main()
   for (int sun = first_sun; sun < light_count; sun++) {
     uvec3 key = uvec3(uint(slot.w), 0x7F4A7C15u + uint(sun - first_sun), uint(seed));
     LightSample light_sample = sample_light(sun, slot.xyz, sample_r2(key, lane));
-    if (!trace_any(slot.xyz, light_sample.direction, NO_HIT)) {
+    vec3 arriving = light_along(slot.xyz, light_sample.direction, NO_HIT, 0);
+    if (arriving != vec3(0.0)) {
       sh_basis(light_sample.direction, basis);
       for (int c = 0; c < COEFFICIENTS; c++) {
-        sum[c] += light_sample.irradiance * (basis[c] / float(GROUP));
+        sum[c] += light_sample.irradiance * arriving * (basis[c] / float(GROUP));
       }
     }
   }

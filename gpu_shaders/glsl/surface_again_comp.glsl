@@ -22,8 +22,11 @@ void main()
     return;
   }
   vec4 seen = imageLoad(geometry, at);
+  vec3 origin = element(probe_slots, first_slot + at.z).xyz;
+  vec3 direction = texel_direction(at.xy);
   if (seen.z >= NO_SURFACE) {
-    imageStore(emission, at, vec4(element(world_texels, at.y * FACE + at.x).rgb, 0.0));
+    vec3 background = element(world_texels, at.y * FACE + at.x).rgb * passed_to(origin, direction, NO_HIT);
+    imageStore(emission, at, vec4(background, 0.0));
     return;
   }
 #ifdef RENUMBER
@@ -33,11 +36,12 @@ void main()
   }
   imageStore(geometry, at, seen);
 #endif
-  vec3 origin = element(probe_slots, first_slot + at.z).xyz;
-  vec3 direction = texel_direction(at.xy);
   vec2 barycentric = barycentric_of(int(seen.w), origin + direction * abs(seen.z));
   Surface surface = resolve_surface(int(seen.w), barycentric, origin, direction, 2.0 / float(FACE));
   vec4 reflects = imageLoad(albedo, at);
+  vec3 passed = passed_to(origin, direction, abs(seen.z) * 0.9999);
+  surface.albedo *= passed;
+  surface.emission *= passed;
   if ((reflects.rgb != vec3(0.0)) != (surface.albedo != vec3(0.0))) {
     imageStore(rebind, ivec2(0), vec4(1.0));
   }

@@ -4,6 +4,7 @@
  *   triangle_attributes, 5 elements a triangle: normals and (material, object, texture scale) in w; uv0 uv1;
  *     uv2, the density with which the triangle is sampled as an emitter (core/emitters.py), its number in the snapshot
  *   materials, 3 elements: diffuse albedo, base image | emission, emission image | alpha, threshold, alpha image, alpha from colour
+ *   tints, 1 element a material: what its holes leave of light, image
  *   image_table, 1 element: first row in image_texels, width, height, extension
  *   image_texels: linear RGBA, mip levels of an image one after the other
  */
@@ -89,6 +90,20 @@ bool is_hole(int triangle, vec2 barycentric)
   }
 #endif
   return alpha < (clip.y > 1.0 ? dither_threshold(triangle, barycentric) : clip.y);
+}
+#endif
+
+#ifdef HAS_TINT
+/* What the hole of a triangle leaves of light that passes it. */
+vec3 hole_tint(int triangle, vec2 barycentric)
+{
+  vec4 tint = element(tints, int(element(triangle_attributes, 5 * triangle).w));
+#ifdef HAS_IMAGES
+  if (tint.w >= 0.0) {
+    tint.rgb *= sample_image(int(tint.w), triangle_uv(triangle, barycentric), 0.0).rgb;
+  }
+#endif
+  return tint.rgb;
 }
 #endif
 
