@@ -11,7 +11,7 @@ packed normal.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -230,14 +230,12 @@ class ReferenceLight:
         first, stop = part if isinstance(part, tuple) else (0, None)
         for number, light in list(enumerate(self._all_lamps()))[first:stop]:
             u = sample_r2(light_keys(keys, number), index).astype(float)
-            visible = (
-                partial(self.scene.visible, group=light.link_group)
-                if shadows
-                else lambda origins, *_: np.ones(len(origins), bool)
-            )
-            light_there = direct_light.irradiance(light, point + self.scene.origin, origin, normal, u, visible)
-            if shadows and light.casts_shadow:
-                way = direct_light.sample_light(light, point + self.scene.origin, u)
+            light = light if shadows else replace(light, casts_shadow=False)
+            visible = partial(self.scene.visible, group=light.link_group)
+            place = point + self.scene.origin
+            light_there = direct_light.irradiance(light, place, origin, normal, u, visible)
+            if light.casts_shadow:
+                way = direct_light.sample_light(light, place, u)
                 light_there *= self.scene.tint(origin, way.directions, way.distances, group=light.link_group)
             total += np.where(self.scene.falls_on(light.link_group, role)[:, None], light_there, 0.0)
         return total

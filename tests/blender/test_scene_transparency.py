@@ -72,7 +72,7 @@ def test_constant_transparency(scene):
     [
         ("ShaderNodeBsdfGlass", {}),
         ("ShaderNodeBsdfRefraction", {}),
-        ("ShaderNodeBsdfPrincipled", {"Transmission Weight": 1.0}),
+        ("ShaderNodeBsdfPrincipled", {"Base Color": (1, 1, 1, 1), "Transmission Weight": 1.0}),
     ],
 )
 def test_glass_lets_light_through(scene, kind, inputs):
@@ -140,3 +140,42 @@ def test_backs_that_are_not_there(scene):
         made, snapshot = read(empty_scene(), built(lambda tree, back=back: shader(tree, back)))
         assert made.base_color == pytest.approx((0.4, 0.2, 0.6)) and made.unseen_by == unseen
         assert made.alpha_threshold == 0 and warned(snapshot, "Backfacing", "'Subject'") == (not unseen)
+
+
+def test_coloured_holes():
+    """Transparent has the colour at once, Glass as well, Principled the root of it: light passes two faces of a solid."""
+    for kind, inputs, tint in (
+        ("ShaderNodeBsdfTransparent", {"Color": (0.8, 0.2, 0.4, 1)}, (0.8, 0.2, 0.4)),
+        ("ShaderNodeBsdfGlass", {"Color": (0.5, 1.0, 0.5, 1)}, (0.5, 1.0, 0.5)),
+        ("ShaderNodeBsdfPrincipled", {"Base Color": (0.25, 1, 0.64, 1), "Transmission Weight": 1.0}, (0.5, 1, 0.8)),
+    ):
+        found, _snapshot = read(empty_scene(), material(kind, kind, inputs))
+        assert found.is_tinted and found.alpha == 0.0 and found.alpha_threshold == DITHERED
+        assert np.allclose(found.tint, tint, atol=1e-4)
+
+
+def test_a_mix_with_coloured_holes(scene):
+    """Half of the area is hole as far as its brightest channel asks for; the other half is what it was."""
+
+    def shader(tree):
+        hole = node(tree, "ShaderNodeBsdfTransparent", {"Color": (0.2, 0.4, 0.8, 1)})
+        leaf = node(tree, "ShaderNodeBsdfDiffuse", {"Color": (0.6, 0.3, 0.3, 1)})
+        return node(
+            tree, "ShaderNodeMixShader", {"Fac": 0.5, "Shader": hole.outputs[0], "Shader_001": leaf.outputs[0]}
+        ).outputs[0]
+
+    found, snapshot = read(scene, built(shader))
+    passed = (1 - found.alpha) * np.array(found.tint)
+    assert np.allclose(passed, [0.1, 0.2, 0.4], atol=1e-4)
+    assert np.allclose(found.alpha * np.array(found.base_color), [0.3, 0.15, 0.15], atol=1e-4) and not snapshot.warnings
+
+
+def test_a_window_of_coloured_panes(scene):
+    """All of it is hole, and its picture the colour of what passes."""
+    found, snapshot = read(
+        scene, built(lambda tree: node(tree, "ShaderNodeBsdfTransparent", {"Color": textured(tree)}).outputs[0])
+    )
+    assert found.alpha == 0.0 and found.alpha_image == NO_IMAGE
+    picture = snapshot.images[found.tint_image].pixels
+    assert np.allclose(picture[:, 4:, :3] * found.tint, [0.2, 0.4, 0.6], atol=1e-4)
+    assert np.allclose(picture[:, :4, :3], 0, atol=1e-4)
