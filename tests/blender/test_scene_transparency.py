@@ -143,7 +143,7 @@ def test_backs_that_are_not_there(scene):
 
 
 def test_coloured_holes():
-    """Transparent has the colour at once, Glass as well, Principled the root of it: light passes two faces of a solid."""
+    """Transparent and Glass have their colour, Principled the root of it: light passes two faces of a solid."""
     for kind, inputs, tint in (
         ("ShaderNodeBsdfTransparent", {"Color": (0.8, 0.2, 0.4, 1)}, (0.8, 0.2, 0.4)),
         ("ShaderNodeBsdfGlass", {"Color": (0.5, 1.0, 0.5, 1)}, (0.5, 1.0, 0.5)),
