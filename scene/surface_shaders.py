@@ -11,7 +11,8 @@ to Cycles as a diffuse reflector with holes can be:
 - Translucent lets light through diffusely: what arrives on one side leaves on the other.
 - Transparent, Glass, Refraction and the transmitting part of Principled let light through unbent: a hole, which may be
   coloured. Thin panes are what such materials mostly are, and caustics of solid glass are beyond a light probe.
-- Mix Shader and Add Shader combine these per pixel. Normal inputs are ignored; they turn light, they do not make it.
+- Mix Shader and Add Shader combine these per pixel. Normal inputs turn light, which is ignored; what normal
+  maps lose by it is not.
 """
 
 from __future__ import annotations
@@ -31,11 +32,13 @@ from .albedos import (
     tinted_coat,
 )
 from .node_links import Scope, Unsupported, find_socket, resolve
+from .normal_maps import share_sent_back
 from .shader_nodes import NodeEvaluator
 from .shader_values import ONE, ZERO, Value, add, apply, blend, complement, constant, multiply
 
 DEFAULT_GREY = constant([0.8, 0.8, 0.8])
 WHITE = constant([1.0, 1.0, 1.0])
+_UNTURNED = 0.999  # share that normal maps of no effect leave
 _GREY = 0.02  # difference of channels up to which transparency counts as grey: part hole, part black
 
 
@@ -93,6 +96,7 @@ def _principled(evaluator, node, scope):
     through = _unit(value("Transmission Weight"))
     share = dielectric_albedo(value("IOR").number(), roughness, value("Specular IOR Level").number())
     albedo = rough_diffuse_albedo(value("Base Color"), value("Diffuse Roughness").number())
+    albedo = _turned(evaluator, node, scope, albedo)
     albedo = layered(value("Specular Tint").scaled(share), share, albedo)
     if not metallic.is_zero():
         evaluator.notices.group("metal reflects its colour in all directions", evaluator.owner_name)
@@ -147,6 +151,11 @@ def _glossy(evaluator, node, scope):
     return Closure(glossy_albedo(color, roughness, getattr(node, "distribution", "") == "MULTI_GGX"))
 
 
+def _turned(evaluator, node, scope, albedo: Value) -> Value:
+    share = share_sent_back(evaluator, node, scope)
+    return albedo if share > _UNTURNED else albedo.scaled(share)
+
+
 def _sheen(evaluator, node, scope):
     albedo = sheen_albedo(evaluator.input(node, "Roughness", scope).number())
     return Closure(evaluator.input(node, "Color", scope).scaled(albedo))
@@ -154,7 +163,8 @@ def _sheen(evaluator, node, scope):
 
 def _rough_diffuse(evaluator, node, scope):
     roughness = evaluator.input(node, "Roughness", scope).number()
-    return Closure(rough_diffuse_albedo(evaluator.input(node, "Color", scope), roughness))
+    albedo = rough_diffuse_albedo(evaluator.input(node, "Color", scope), roughness)
+    return Closure(_turned(evaluator, node, scope, albedo))
 
 
 def _translucent(evaluator, node, scope):
