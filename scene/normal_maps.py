@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What normal maps cost: a diffuse surface whose normals are turned, on flat ground, sends less back.
 
-A normal that leans misses the part of its hemisphere below the ground, and Cycles takes away more where light comes
-at a slant from the side it leans to (Chiang, Li and Burley, "Taming the Shadow Terminator", SIGGRAPH Talks 2019), so
-that nothing shines through from behind. What leans one way here leans the other way there: direction does not stay, the loss does.
+A normal that leans misses the part of its hemisphere below the ground, and where light comes at a slant Cycles takes
+away more, by a shadowing function (Estevez, Lecocq and Stein, "A Microfacet-Based Shadowing Function to Solve the Bump
+Terminator Problem", Ray Tracing Gems, 2019). What leans one way here leans the other way there: direction does not
+stay, the loss does.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from .node_links import Scope, Unsupported, find_socket, resolve
 
 # Share of light from evenly all over the hemisphere that a normal which leans by so many degrees sends back: the
 # integral of both, over a million directions.
-_ANGLES = np.radians([0, 5, 10, 15, 20, 30, 41, 50, 60, 90])
-_SHARES = [1.0, 0.986, 0.959, 0.928, 0.896, 0.832, 0.765, 0.713, 0.658, 0.5]
+_ANGLES = np.radians([0, 5, 10, 15, 20, 30, 41, 50, 60, 70, 80])
+_SHARES = [1.0, 0.996, 0.984, 0.967, 0.943, 0.879, 0.784, 0.689, 0.566, 0.421, 0.343]
 
 
 def share_sent_back(evaluator, node, scope: Scope | None) -> float:

@@ -22,15 +22,15 @@ def sent_back(normal, strength=1.0):
 
 
 def hemisphere_share(angle):
-    """Of even light above, what a diffuse normal that leans by ``angle`` sends back, with Cycles' term against light
-    from behind, by directions on a spiral."""
+    """Of even light above, what a diffuse normal that leans by ``angle`` sends back under Smith's shadowing function of
+    a GGX surface of α² = tan² / 8, by directions on a spiral."""
     count = 200_000
     z = (np.arange(count) + 0.5) / count
     turn = np.arange(count) * 2.399963229728653
     x = np.sqrt(1 - z * z) * np.cos(turn)
     cosine = np.maximum(x * np.sin(angle) + z * np.cos(angle), 0.0)
-    g = np.minimum(z / np.maximum(cosine * np.cos(angle), 1e-12), 1.0)
-    return (2 * cosine * (g + g**2 - g**3)).mean()
+    shadowing = 2 / (1 + np.sqrt(1 + np.tan(angle) ** 2 / 8 * (1 / z**2 - 1)))
+    return (2 * cosine * shadowing).mean()
 
 
 @pytest.mark.parametrize("degrees", [0, 10, 20, 41, 60])
