@@ -20,6 +20,14 @@ def animated_states(scene: bpy.types.Scene) -> dict[str, np.ndarray]:
     return {item.name: _state(item) for item in scene.objects if is_animated(item) or is_animated(item.data)}
 
 
+def evaluate_animation(scene: bpy.types.Scene) -> None:
+    """Has Blender put everything back that ``taken_back`` tells of, the next time it evaluates the scene."""
+    for item in scene.objects:
+        for block in (item, item.data):
+            if is_animated(block):
+                block.update_tag(refresh={"TIME"})
+
+
 def taken_back(scene: bpy.types.Scene, before: dict[str, np.ndarray]) -> list[str]:
     """A line for each object whose state of ``before`` its animation has overruled since."""
     return [

@@ -28,7 +28,7 @@ from ..scene.field_storage import store_field, stored_details, stored_metadata
 from ..scene.probe_objects import read_edits
 from ..scene.read import read_in_steps
 from . import kept_bakes
-from .animated import animated_states, taken_back
+from .animated import animated_states, evaluate_animation, taken_back
 from .bake_progress import Progress
 from .kept_bakes import KeptBake
 from .stale import edit_count
@@ -143,18 +143,15 @@ class BakeTask:
         self, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer
     ) -> Steps[tuple[SceneSnapshot, SceneSnapshot | None]]:
         """The scene as it is rendered, and as it is shown, which says later whether it is still the one that was
-        baked. None for that where somebody edited it between the steps: what was read may be of either state."""
-        reading = together(read_in_steps(scene, view_layer), read_in_steps(scene, view_layer, live=True))
-        disturbed = False
-        while True:
-            try:
-                next(reading)
-            except StopIteration as end:
-                snapshot, shown = end.value
-                return snapshot, None if disturbed else shown
-            edits = edit_count(self._scene)  # reading itself counts as some
-            yield
-            disturbed = disturbed or edit_count(self._scene) != edits
+        baked. None for that where somebody edited it in between."""
+        evaluate_animation(scene)
+        reading = together(read_in_steps(scene, view_layer, live=True), read_in_steps(scene, view_layer))
+        next(reading)  # what is shown; the next step evaluates what is rendered, which itself looks like an edit
+        edits = edit_count(self._scene)
+        yield
+        is_edited = edit_count(self._scene) != edits
+        shown, snapshot = yield from reading
+        return snapshot, None if is_edited else shown
 
     def _bake(
         self, uid: int, snapshot: SceneSnapshot, grid: Grid, edits: ProbeEdits | None

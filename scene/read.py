@@ -97,9 +97,9 @@ def read_scene(
 def read_in_steps(
     scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer | None = None, *, live: bool = False
 ) -> Steps[SceneSnapshot]:
-    """``read_scene`` in steps: in one of them Blender evaluates the scene and its arrays are copied, the first, or with
-    ``live`` the second, so that two readings side by side take turns at it. Materials follow, one by one and for both
-    in the same steps, and triangles in a thread.
+    """``read_scene`` in steps: in one of them Blender evaluates the scene and its arrays are copied, in the second, or
+    with ``live`` in the first, so that two readings side by side take turns at it. Materials follow, one by one, and
+    triangles in a thread.
 
     Raises:
         InputError: something of it was deleted between two steps.
@@ -107,12 +107,12 @@ def read_in_steps(
     """
     try:
         view_layer = view_layer or scene.view_layers[0]
-        if live:
-            yield
         steps = _read(scene, view_layer, as_in_viewport if live else at_render_quality, Pace(STEP_SECONDS))
+        if not live:
+            yield
         next(steps)
         yield
-        if not live:
+        if live:
             yield
         return (yield from steps)
     except ReferenceError as error:  # how Blender tells that a datablock is gone

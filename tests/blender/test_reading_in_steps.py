@@ -111,10 +111,26 @@ def test_light_is_not_called_up_to_date_when_the_scene_was_edited_while_it_was_r
     task = BakeTask(scene, scene.view_layers[0], [room])
     lamp = bpy.data.objects["Point"]
     for step, _ in enumerate(task):
-        if edited and step == 1:  # the scene was read as renders show it, but not yet as the viewport does
+        if edited and step == 1:  # the scene was read as the viewport shows it, but not yet as renders do
             assert task.progress.phase_name == "read"
             lamp.location.x -= 1.0
-            scene.view_layers[0].update()
+        scene.view_layers[0].update()  # as Blender does between two steps
     assert bool(stored_details(room)["viewport_hashes"]) is not edited
     stale.compare(scene, scene.view_layers[0])
     assert stale.state_of(scene, room) == (stale.STALE if edited else stale.FRESH)
+
+
+def test_light_is_up_to_date_after_animation_has_overruled_a_change_by_hand(scene, room, gpu_context):
+    lamp = bpy.data.objects["Point"]
+    lamp.keyframe_insert("location", frame=1)
+    lamp.data.keyframe_insert("energy", frame=1)
+    scene.view_layers[0].update()
+    lamp.location.x -= 1.0
+    lamp.data.energy *= 2.0
+    task = BakeTask(scene, scene.view_layers[0], [room])
+    for _ in task:
+        scene.view_layers[0].update()  # as Blender does between two steps
+    assert any("'Point' is animated and was changed by hand" in line for line in task.progress.warnings)
+    assert stored_details(room)["viewport_hashes"]
+    stale.compare(scene, scene.view_layers[0])
+    assert stale.state_of(scene, room) == stale.FRESH
