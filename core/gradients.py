@@ -15,6 +15,7 @@ GLSL twins: field_gradient_comp.glsl, emission_project_comp.glsl.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -50,8 +51,10 @@ class TexelEdges:
     across: np.ndarray  # (E, 3) tangent from first to second, as long as the edge is wide in radians
 
 
+@cache
 def texel_edges(face: int) -> TexelEdges:
-    """The edges of cubes with ``face`` texels along a face's edge. Edges are great circles."""
+    """The edges of cubes with ``face`` texels along a face's edge, the same object every time. Edges are great
+    circles."""
     place = np.arange(face + 1) * 2.0 / face - 1.0
     forward, right, up = (axes[:, None, None, :] for axes in (FACE_FORWARD, FACE_RIGHT, FACE_UP))
     corners = forward + place[:, None] * right + place[:, None, None] * up  # [face, row, column]

@@ -218,7 +218,8 @@ def _in_words(results: list[BakeResult], seconds: float) -> str:
     if all(result.relit and not result.iterations for result in results):
         return f"Nothing had changed: {active} probes keep their light"
     done = "relit" if all(result.relit for result in results) else "baked"
-    text = f"{active} probes {done} in {seconds:.1f} s, light bounced {bounces} times"
+    often = {0: "did not bounce", 1: "bounced once", 2: "bounced twice"}.get(bounces, f"bounced {bounces} times")
+    text = f"{active} probes {done} in {seconds:.1f} s, light {often}"
     predicted = [result.error["predicted"] for result in results if result.error]
     if predicted and None not in predicted:
         text += f", {100 * max(predicted):.1f} % error at probes by its own estimate"

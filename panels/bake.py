@@ -9,6 +9,7 @@ from ..formats.probe_metadata import LIGHTS, WORLD
 from ..operators import names
 from ..operators.bake import last_failure, running_task
 from ..operators.kept_bakes import goes_on
+from ..operators.libraries import library_of
 from ..operators.quality import QUALITIES
 from ..operators.stale import EDITED, STALE, changed_parts, state_of
 from ..operators.volume_choice import active_volume, volumes_of
@@ -109,7 +110,9 @@ def _state(layout, context) -> None:
     if has_moved(volume):
         paragraph(row, context, "The volume has changed since the bake. Bake again", "ERROR", buttons=1)
     elif state == STALE:
-        remedy = "Relight" if goes_on(context.scene, volume) else "Bake again"
+        library = library_of(volume)
+        again = f"Bake in {library}" if library else "Bake again"
+        remedy = "Relight" if goes_on(context.scene, volume) else again
         paragraph(row, context, f"{_what_changed(context.scene, volume)} since the bake. {remedy}", "ERROR", buttons=1)
     elif state == EDITED:
         row.label(text="Edited since the bake", icon="QUESTION")

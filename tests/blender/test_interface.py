@@ -297,6 +297,14 @@ def test_a_relight_without_changes_says_so(room, gpu_context):
     assert stored_metadata(room)["iterations"] == iterations > 1
 
 
+@pytest.mark.parametrize("bounces, words", [(0, "did not bounce"), (1, "bounced once"), (3, "bounced 3 times")])
+def test_outcomes_say_how_often_light_bounced(room, gpu_context, bounces, words):
+    settings = bpy.context.scene.gridlight
+    settings.bounces_auto, settings.bounces, settings.face = False, bounces, 4
+    bpy.ops.gridlight.bake()
+    assert f"light {words}" in stored_details(room)["outcome"]
+
+
 def test_an_animated_lamp_moved_by_hand_goes_back_and_that_is_said(room, gpu_context):
     """As in a render; light and lamp then agree."""
     lamp = bpy.data.objects["Point"]
