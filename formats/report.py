@@ -132,7 +132,7 @@ def _cards(report: ReportData) -> str:
         ("total", "probes in all"),
         ("active", "active"),
         ("culled", "culled, light nothing"),
-        ("invalid", "invalid, inside solids"),
+        ("invalid", "invalid, inside solids or in the dark behind walls"),
     ):
         if key in report.counts:
             cards.append((f"{report.counts[key]:,}".replace(",", " "), text, ""))
