@@ -39,7 +39,7 @@ def depth_clamp(grid: Grid) -> float:
 def visibility_bias(grid: Grid) -> float:
     """Metres that a surface point is moved along its normal before it is tested, so that its own surface does not hide
     it."""
-    return 0.12 * float(grid.cell_size().min())
+    return 0.1 * float(grid.cell_size().min())
 
 
 def least_deviation(grid: Grid) -> float:
