@@ -8,19 +8,26 @@ parallel, the sum is added at once (Aitken's delta-squared process for vectors),
 rooms. Parallel matters: a mode that alternates in sign shrinks just as steadily and would be blown up. Two estimates
 in a row must be below the tolerance: bright lamps in view and a dim room around them are two modes, and the first
 changes tell only of the fast one.
+
+A closed cupboard of white walls fills with light for thousands of bounces. After PATIENCE of them nobody waits for such
+hollows if they are a minor part that holds little light, and everything else has settled; that they are there is told.
+Before that they are not extrapolated to their limit, which nobody could check: path tracers give up as early.
 """
 
 from __future__ import annotations
 
 import math
 
-from ..core.extrapolation import STATES
+from ..core.extrapolation import STATES, Sums
+from ..core.patches import PATIENCE
 
 AUTO_LIMIT = 512
 MANY_MODES = math.inf  # in place of a factor: the last states tell the limit, see core/extrapolation.py
 _PARALLEL = 0.5  # most sine of the angle between two changes for the tail to be added, per (1 − ratio)
 _SINE_ROUNDING = 1e-6  # squared sine below what float32 sums can tell from zero
 _MOST_RATIO = 0.9985  # above it the tail is too uncertain to add
+_MINOR, _LITTLE = 0.25, 0.25  # share of the patches and of |light| that hollows may have where nobody waits for them
+_ANY = 1e-3  # share of the patches: less is no hollow
 _ROUNDING = 5e-7  # relative change that is nothing but float32 rounding
 
 
@@ -37,15 +44,17 @@ class Convergence:
         self.missing = math.inf  # estimated share of the light still to come
         self.done = False
         self.converged = False
+        self.has_hollows = False  # that are still filling with light
         self.reason = ""
 
-    def add(self, energy: float, change: float, overlap: float) -> float:
-        """Takes |field|², |change|² and change · last change of one iteration. Returns the factor to extrapolate by, 0
-        for none, MANY_MODES where the last STATES states are to tell.
+    def add(self, sums: Sums) -> float:
+        """Takes the sums of one iteration. Returns the factor to extrapolate by, 0 for none, MANY_MODES where the last
+        STATES states are to tell.
 
         The first iteration is direct light and may be dark: what glows and the world arrive with the first bounce.
         Each further one is a bounce.
         """
+        energy, change, overlap = sums[:3]
         self.iterations += 1
         self._lengths.append(math.sqrt(change))
         if not (math.isfinite(energy) and math.isfinite(change)):
@@ -57,12 +66,8 @@ class Convergence:
             return 0.0
         relative = math.sqrt(change / energy) if energy > 0 else 0.0
         self.changes.append(relative)
-        ratio = max(self._ratio(), self._slowest)
-        last_missing = self.missing
-        if relative < _ROUNDING:
-            self.missing = relative
-        else:
-            self.missing = relative * ratio / (1.0 - ratio) if ratio < 1.0 else math.inf
+        ratio = max(_ratio(self._lengths), self._slowest)
+        last_missing, self.missing = self.missing, _still_missing(relative, ratio)
         bounces = self.iterations - 1
         if self._bounces is not None:
             self.done = bounces >= self._bounces
@@ -77,6 +82,13 @@ class Convergence:
                 f"converged after {self.iterations} iterations: an estimated {self.missing:.2g} "
                 f"of the light is missing, tolerance {self._tolerance:g}"
             )
+        elif bounces >= PATIENCE and _has_hollows(sums) and sums.open_tail < self._tolerance**2 * sums.open_energy:
+            self.done = self.converged = self.has_hollows = True
+            self.missing = math.sqrt(sums.open_tail / sums.open_energy)
+            self.reason = (
+                f"converged after {self.iterations} iterations: an estimated {self.missing:.2g} of the light is "
+                f"missing, tolerance {self._tolerance:g}, but for hollows that are still filling with light"
+            )
         elif bounces >= AUTO_LIMIT:
             self.done = True
             self.reason = (
@@ -88,6 +100,8 @@ class Convergence:
             self._slowest = max(self._slowest, step)
             self._lengths.clear()
             return step / (1.0 - step)
+        elif bounces < PATIENCE and _has_hollows(sums):
+            pass
         elif len(self._lengths) >= STATES and self._lengths[-1] < _MOST_RATIO * self._lengths[-2]:
             # the first change after an extrapolation is not of its series
             self._slowest = max(self._slowest, min(self._lengths[-1] / self._lengths[-2], _MOST_RATIO))
@@ -105,12 +119,24 @@ class Convergence:
         least = max((_PARALLEL * (1.0 - last / before)) ** 2, _SINE_ROUNDING)
         return sine_squared < least
 
-    def _ratio(self) -> float:
-        """By how much a change is smaller than the one before, the larger of the last step and the mean of the last
-        two: where a fast mode hides a slow one the last step is first to show it, where changes alternate the mean is
-        steadier."""
-        lengths = self._lengths
-        if len(lengths) < 2 or lengths[-2] == 0:
-            return math.inf
-        step = lengths[-1] / lengths[-2]
-        return max(step, math.sqrt(lengths[-1] / lengths[-3])) if len(lengths) >= 3 and lengths[-3] > 0 else step
+
+def _has_hollows(sums: Sums) -> bool:
+    """Are there slow patches that are a minor part and hold little light?"""
+    return _ANY < sums.slow < _MINOR and sums.energy - sums.open_energy < _LITTLE**2 * sums.energy
+
+
+def _still_missing(relative: float, ratio: float) -> float:
+    """Share of the light that is still to come after a ``relative`` change that was ``ratio`` of the one before."""
+    if relative < _ROUNDING:
+        return relative
+    return relative * ratio / (1.0 - ratio) if ratio < 1.0 else math.inf
+
+
+def _ratio(lengths: list[float]) -> float:
+    """By how much a change is smaller than the one before, the larger of the last step and the mean of the last two:
+    where a fast mode hides a slow one the last step is first to show it, where changes alternate the mean is
+    steadier."""
+    if len(lengths) < 2 or lengths[-2] == 0:
+        return math.inf
+    step = lengths[-1] / lengths[-2]
+    return max(step, math.sqrt(lengths[-1] / lengths[-3])) if len(lengths) >= 3 and lengths[-3] > 0 else step

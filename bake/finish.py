@@ -20,6 +20,7 @@ from .deringing import dering_field
 from .outcome import BlockOutcome
 from .result import BakeResult
 
+_MOST_NAMED = 8  # probes
 _AT_HOME = 1e-5  # cells: steps are rounded
 
 
@@ -53,6 +54,7 @@ def complete(
         )
     else:
         states[nodes[inside & (state[nodes] == ACTIVE)]] = INVALID
+    _warn_of_hollows(result, grid, states, outcomes)
     field = result.field = Field.empty(grid, settings.bands)
     field.state[:] = states
     field.offset[:] = offset
@@ -78,6 +80,21 @@ def complete(
         raise InputError(
             f"scene '{scene_name}' sends light that is not finite; look for lights or emission beyond 1e30"
         )
+
+
+def _warn_of_hollows(result: BakeResult, grid: Grid, states: np.ndarray, outcomes: list[BlockOutcome]) -> None:
+    hollow = np.sort(np.concatenate([np.zeros(0, np.int64), *(outcome.hollow for outcome in outcomes)]))
+    hollow = hollow[states[hollow] == ACTIVE]
+    if not len(hollow):
+        return
+    nx, ny, _ = grid.resolution
+    named = ", ".join(f"({node % nx}, {node // nx % ny}, {node // (nx * ny)})" for node in hollow[:_MOST_NAMED])
+    more = f" and {len(hollow) - _MOST_NAMED} more" if len(hollow) > _MOST_NAMED else ""
+    result.warnings.append(
+        f"{grid.name}: {len(hollow)} of {(states == ACTIVE).sum()} probes stand in closed hollows that light hardly "
+        f"gets into or out of; they show it after {result.iterations - 1} bounces, not settled: {named}{more}. Where "
+        "that matters darken what is nearly white in there, or open it"
+    )
 
 
 def tell(result: BakeResult, outcomes: list[BlockOutcome]) -> None:

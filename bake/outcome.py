@@ -18,6 +18,7 @@ class BlockOutcome:
     coefficients: np.ndarray  # (S, bands², 3) float32 radiance
     depth: np.ndarray  # (S, DEPTH_EDGE², 2) float32
     gradient: np.ndarray  # (S, 3, K, 3) float32, not limited
+    hollow: np.ndarray  # (H,) int64 of nodes: probes in hollows that were still filling with light
     moved: int = 0  # probes that were moved out of walls
     patches: int = 0
     iterations: int = 0
@@ -28,4 +29,4 @@ class BlockOutcome:
     change: tuple[float, ...] = ()
 
 
-ARRAYS = ("nodes", "offset", "shares", "coefficients", "depth", "gradient")
+ARRAYS = ("nodes", "offset", "shares", "coefficients", "depth", "gradient", "hollow")

@@ -243,15 +243,13 @@ class VolumeBake:
         convergence = Convergence(self.settings.bounces, self.settings.tolerance)
         while not convergence.done:
             with self._stopwatch("light"):
-                energy, change, overlap, luminance = self.backend.light.iterate(
-                    bounce=warm or convergence.iterations > 0
-                )
+                sums, luminance = self.backend.light.iterate(bounce=warm or convergence.iterations > 0)
                 # The first step from settled light is by how much its sources changed.
-                if warm and not convergence.iterations and not change <= _SMALL_CHANGE**2 * energy:
+                if warm and not convergence.iterations and not sums.change <= _SMALL_CHANGE**2 * sums.energy:
                     warm = False
                     continue
                 self.result.energy.append(luminance)
-                factor = convergence.add(energy, change, overlap)
+                factor = convergence.add(sums)
                 self._reporter.advance(1)
                 if factor == MANY_MODES:
                     self.backend.light.extrapolate_modes()
@@ -264,7 +262,22 @@ class VolumeBake:
         self.result.change = convergence.changes
         self.result.notes.append(convergence.reason)
         self._reason = convergence.reason
+        self._hollow_nodes = np.zeros(0, np.int64)
+        if convergence.has_hollows:
+            yield from self._find_hollows()
         return warm
+
+    def _find_hollows(self) -> Steps[None]:
+        """Which active probes see mostly hollows that are still filling with light."""
+        found = []
+        for index in range(self._batches.count):
+            surfaces = yield from self._batches.bound(index)
+            layers = np.arange(surfaces.count)
+            shares = self.backend.light.slow_shares(surfaces.textures["albedo"], self.settings.face, layers)
+            found.append(self._batches.nodes[surfaces.first + layers[shares > 0.5]])
+            yield
+        nodes = np.concatenate(found)
+        self._hollow_nodes = nodes[self._state[nodes] == ACTIVE]
 
     def _mark_unshown(self, emission: bool) -> None:
         """The light of all probes has changed; with ``emission``, also what they see of sampled emitters."""
@@ -326,6 +339,7 @@ class VolumeBake:
             self.backend.read_field(),
             self.backend.read_depth(),
             self.backend.read_gradient(),
+            self._hollow_nodes,
             int(placement.moved.sum()),
             self.backend.light.count,
             result.iterations,

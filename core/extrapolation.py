@@ -1,12 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The limit of a linear iteration from its last states."""
+"""The limit of a linear iteration from its last states, and the sums that tell how far it is."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 STATES = 9  # that are kept for it
 _LEAST_GAIN = 0.9  # of the last change: an extrapolation that leaves more of it is not worth having
+
+
+class Sums(NamedTuple):
+    """Over the patches in probes' sight, squares to one scale. Slow patches lie in hollows that light takes more than
+    PATIENCE bounces to enter or leave (core/patches.py), and have not settled."""
+
+    energy: float  # |irradiance|²
+    change: float  # |irradiance − the one before|²
+    overlap: float  # change · the change before
+    slow: float = 0.0  # share of the patches
+    open_energy: float = 0.0  # |irradiance|² of the others
+    open_tail: float = 0.0  # |what is still to come|² of the others, each by its own last two changes
 
 
 def reduced_rank(states: np.ndarray) -> np.ndarray | None:

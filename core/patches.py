@@ -42,9 +42,12 @@ _MOST_EFFORT = 256
 ERRORS = (0.28, 1.1, 4.4)  # of one sample, of the light, from which on the next of SAMPLES is taken
 SHADOWED = 0.25  # variance of light that may or may not be shadowed, of its square
 DARK = 0.1  # of the mean light: errors of darker patches are held against this
+PATIENCE = 32  # bounces: where light needs more to come and go nobody waits for it, nor do path tracers
+SLOW = 1 - 1 / PATIENCE  # of the change before: what a bounce changes there
+MOST_CAUGHT = 4  # patches whose rays may end on nothing but each other by chance
 _CELL_SHARE = 0.25  # of the grid's shortest spacing: edge of plain cells
 _LEAST_CELLS = 32  # plain cells along the diagonal of the volume's box
-VARIANTS = 3  # patches of one cell that do not see each other; hits beyond join the last
+VARIANTS = 4  # patches of one cell that do not see each other; texels beyond show the last
 _FINEST = -10  # level: cells of 2⁻¹⁰ of the plain size
 _SHIFT = 0.37  # of a cell: walls tend to lie at round numbers
 _AXIS_BITS = 18
@@ -91,6 +94,38 @@ def light_parts(lamps: int, has_emitters: bool) -> list[Part]:
 def coarser_by(round_: int) -> int:
     """Levels by which cells grow for what only rays of a round see."""
     return min(round_, _COARSEST)
+
+
+def caught(ends: np.ndarray) -> np.ndarray:
+    """(N,) bool: patches whose rays (N, R) keep light among MOST_CAUGHT patches at most for ever.
+
+    In a slit all rays of a patch end on the one across, and all of that one's back on it: none of so few found the way
+    out. Between white walls light would add up there without end, so the first ray of each counts as lost. Of the other
+    patches it is the rays but the first that are looked at, which stay.
+    """
+    result = np.zeros(len(ends), bool)
+    for patch in range(len(ends)):
+        members, rest = [patch], list(ends[patch])
+        while rest and len(members) <= MOST_CAUGHT and NOTHING not in rest:
+            found = [end for end in dict.fromkeys(rest) if end != NO_PATCH and end not in members]
+            members += found
+            rest = [end for member in found for end in ends[member, 1:]]
+        result[patch] = not rest
+    return result
+
+
+def tail_squared(change: np.ndarray, last_change: np.ndarray) -> np.ndarray:
+    """(N,) |what is still to come|² of patches by their last changes (N, 3), if it comes within PATIENCE bounces."""
+    square, before = (change**2).sum(axis=1), (last_change**2).sum(axis=1)
+    ratio = np.minimum(np.sqrt(square / np.maximum(before, 1e-37)), SLOW)
+    return square * (ratio / (1 - ratio)) ** 2
+
+
+def is_slow(irradiance: np.ndarray, change: np.ndarray, last_change: np.ndarray, tolerance: float) -> np.ndarray:
+    """(N,) bool: patches in hollows, whose last changes (N, 3) are nearly the same and would add up to more than the
+    ``tolerance`` of their ``irradiance`` (N, 3) in as many bounces as light takes there."""
+    square, before = (change**2).sum(axis=1), (last_change**2).sum(axis=1)
+    return (square > SLOW**2 * before) & (square > (tolerance * (1 - SLOW)) ** 2 * (irradiance**2).sum(axis=1))
 
 
 class CellRule:
@@ -167,6 +202,10 @@ class Patches:
         """(H,) patch of each of ``hits`` (H, 4), position and packed normal; NO_PATCH for hits with a negative one.
         Patches that are missing are founded, or left NO_PATCH without ``found``.
 
+        Of a hit that sees none of the VARIANTS leaders in its cell, a texel shows the light of the last, as it has to
+        show some, and a ray has NO_PATCH: joining it there lit closed cupboards, where a crowded corner's cell held
+        the inside and the outside.
+
         ``view_distance`` (H,) metres to the probe whose texels the hits are; None for ends of rays between patches.
         ``sees(items, patches)`` tells which hits (by number) see the leader of a patch. ``row_length``: hits in a row,
         whose neighbours lie side by side. ``sheets`` (H,) int: the sheet that each hit lies on; None for no sheets.
@@ -177,7 +216,7 @@ class Patches:
         keys = self._rule.keys(hits[pending], None if view_distance is None else view_distance[pending], coarser)
         keys = keys + sheets[pending].astype(np.uint64) * _SHEET_KEY
         first_new = self.count
-        leads = np.zeros(len(hits), bool)
+        competes = np.ones(len(hits), bool)
         for variant in range(VARIANTS):
             if not len(pending):
                 break
@@ -187,16 +226,20 @@ class Patches:
                 self._found(variant, unique, known, pending[first], hits, sheets)
             ids = known[inverse]
             joined = (ids >= first_new) & (first[inverse] == np.arange(len(pending)))  # a leader sees itself
-            leads[pending[joined]] = True
+            competes[pending[joined]] = False
             ask = np.flatnonzero((ids >= 0) & ~joined)
             if len(ask):
-                joined[ask] = sees(pending[ask], ids[ask]) if variant < VARIANTS - 1 else True
+                joined[ask] = sees(pending[ask], ids[ask])
+            if variant == VARIANTS - 1 and view_distance is not None:
+                blind = ~joined & (ids >= 0)
+                result[pending[blind]] = ids[blind]
+                competes[pending[blind]] = False
             result[pending[joined]] = ids[joined]
             pending, keys = pending[~joined], keys[~joined]
         if view_distance is not None:
             self.seen[result[result >= 0]] = True
         if found:
-            self._choose_points(first_new, hits, np.where(leads, NO_PATCH, result), row_length)
+            self._choose_points(first_new, hits, np.where(competes, result, NO_PATCH), row_length)
         return result
 
     def bind_ends(

@@ -27,10 +27,12 @@ from .patches import (
     EMITTERS,
     MOST_ROUNDS,
     NO_PATCH,
+    NOTHING,
     RAYS,
     SAMPLES,
     Part,
     Patches,
+    caught,
     direct_samples,
     effort,
     light_parts,
@@ -328,6 +330,7 @@ class ReferenceLight:
             ends.append(self._bind_ends(rays, round_).reshape(-1, rays_each))
         self.light_new_patches()
         self._ends = np.concatenate(ends)
+        self._ends[caught(self._ends), 0] = NOTHING
         self._brought = np.concatenate([rays.brought for rays in parts])
         self._reflected = np.concatenate([rays.reflected for rays in parts])
 

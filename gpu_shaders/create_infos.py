@@ -12,6 +12,7 @@ from ..core.emitters import CANDIDATES, EMITTER_BOXES
 from ..core.gradients import LEAST_COSINE
 from ..core.images import HALF_MAX
 from ..core.lookup import BEYOND, INVALID_WEIGHT, LEAST_DISTANCE, LEAST_WEIGHT
+from ..core.patches import SLOW
 
 NO_SURFACE = "1.0e30"
 # What shaders begin with that sum up a probe's texels.
@@ -307,9 +308,11 @@ def patch_change_comp(info, defines):
     _samplers(info, "irradiance_new", "irradiance_old", "irradiance_older", "patch_seen", "brightest")
     _image(info, 0, "change")
     _ints(info, "patch_count")
+    info.define("SLOW", repr(SLOW))
     info.push_constant("FLOAT", "unseen")
+    info.push_constant("FLOAT", "tolerance")
     _one_group(info)
-    return {"compute": ["data_lib", "patch_change_comp"]}
+    return {"compute": ["data_lib", "patch_slow_lib", "patch_change_comp"]}
 
 
 def patch_extrapolate_comp(info, defines):

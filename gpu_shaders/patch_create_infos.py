@@ -4,7 +4,7 @@ create_infos.py."""
 
 from __future__ import annotations
 
-from ..core.patches import DARK, ERRORS, POINTS, SHADOWED
+from ..core.patches import DARK, ERRORS, POINTS, SHADOWED, SLOW
 from .create_infos import _image, _ints, _one_group, _samplers, _scene, _surface_files
 
 
@@ -143,6 +143,15 @@ def patch_seen_comp(info, defines):
     _samplers(info, "albedo", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "seen", pixel="R32F")
     return _linear(info, "patch_seen_comp")
+
+
+def probe_hollow_comp(info, defines):
+    info.define("SLOW", repr(SLOW))
+    slot = _samplers(info, "probe_layers", "irradiance_new", "irradiance_old", "irradiance_older")
+    _samplers(info, "albedo", kind="FLOAT_2D_ARRAY", first=slot)
+    _image(info, 0, "shares", pixel="R32F")
+    info.push_constant("FLOAT", "tolerance")
+    return _linear(info, "patch_slow_lib", "probe_hollow_comp")
 
 
 def patch_table_comp(info, defines):

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import gpu
 import numpy as np
 
-from ..core.extrapolation import STATES, reduced_rank
+from ..core.extrapolation import STATES, Sums, reduced_rank
 from ..core.grid import Grid
 from ..core.patches import MOST_ROUNDS, RAYS, effort, gather_rays
 from ..core.settings import BakeSettings
@@ -105,8 +105,18 @@ class PatchLight:
             if stop == self.count:
                 break
         yield from self.light_new_patches()
+        if not is_direct:
+            self._let_go_of_caught()
         self._irradiance = [allocate(self.count, "patches") for _ in range(STATES)]
         yield
+
+    def _let_go_of_caught(self) -> None:
+        """Light that a handful of patches would keep among themselves for ever gets lost."""
+        shader = program("patch_caught_comp")
+        shader.image("ray_ends", self._ends.texture)
+        shader.uniform_int("patch_count", (self.count,))
+        shader.uniform_int("rays_each", (self._rays_each,))
+        dispatch_linear(shader, self.count)
 
     def carry_again(self) -> Steps[bool]:
         """What rays bring along and reflect, for another world or other materials, in steps; where they end stays.
@@ -200,12 +210,9 @@ class PatchLight:
         """Newest irradiance, an element a patch."""
         return self._irradiance[0]
 
-    def iterate(self, bounce: bool) -> tuple[float, float, float, float]:
-        """The first irradiance, of direct light, or one bounce more.
-
-        Returns sums over patches in probes' sight: |irradiance|², |change|², change · change before, all to one scale;
-        luminance.
-        """
+    def iterate(self, bounce: bool) -> tuple[Sums, float]:
+        """The first irradiance, of direct light, or one bounce more. Returns sums over patches in probes' sight, all to
+        one scale; of their luminance to none."""
         self._irradiance.insert(0, self._irradiance.pop())
         self._bounce(
             self.direct,
@@ -219,7 +226,7 @@ class PatchLight:
         )
         return self._compare(*self._irradiance[:3])
 
-    def _compare(self, new, old, older) -> tuple[float, float, float, float]:
+    def _compare(self, new, old, older) -> tuple[Sums, float]:
         if self._brightest is None:
             self._brightest = scratch(1, "patches", "R32F")
             reduce_patches(self.direct, 0, self.count, self._brightest, 0, others=self._brought.texture)
@@ -229,11 +236,12 @@ class PatchLight:
         shader.uniform_sampler("patch_seen", self.patches.seen)
         shader.uniform_sampler("brightest", self._brightest)
         shader.uniform_float("unseen", _UNSEEN)
+        shader.uniform_float("tolerance", self._settings.tolerance)
         shader.image("change", self._change)
         shader.uniform_int("patch_count", (self.count,))
         gpu.compute.dispatch(shader, 1, 1, 1)
-        (energy, change, overlap, luminance), (scale, *_) = read(self._change, 2).tolist()
-        return energy, change, overlap, luminance / scale
+        (energy, change, overlap, luminance), (scale, *others) = read(self._change, 2).tolist()
+        return Sums(energy, change, overlap, *others), luminance / scale
 
     def _bounce(
         self, direct, brought, reflected, ends, rays_each: int, count: int, target, bounce: bool = True
@@ -271,6 +279,20 @@ class PatchLight:
             rows = np.zeros((self.count, 4), np.float32)
             rows[:, :3] = limit
             self._irradiance[0] = upload(rows, "patches")
+
+    def slow_shares(self, albedo: gpu.types.GPUTexture, face: int, layers: np.ndarray) -> np.ndarray:
+        """(L,) for probes in ``layers`` (L,) of texel surfaces with ``albedo``: of their texels that see patches, the
+        share that sees slow ones. After the last iteration."""
+        shares = scratch(len(layers), "probes", "R32F")
+        shader, listed = program("probe_hollow_comp", FACE=face), numbers(layers, "probes")
+        shader.uniform_sampler("probe_layers", listed)
+        for name, texture in zip(("irradiance_new", "irradiance_old", "irradiance_older"), self._irradiance):
+            shader.uniform_sampler(name, texture)
+        shader.uniform_sampler("albedo", albedo)
+        shader.uniform_float("tolerance", self._settings.tolerance)
+        shader.image("shares", shares)
+        gpu.compute.dispatch(shader, len(layers), 1, 1)
+        return read(shares, len(layers), channels=1)[:, 0]
 
     # Final gather
     # ------------------------------------------------------------------------------------------------------------------

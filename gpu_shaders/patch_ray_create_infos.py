@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from ..core.patches import MOST_CAUGHT, NO_PATCH, NOTHING
 from .create_infos import _emitters, _image, _ints, _light_files, _samplers, _scene, _sheet_files, _sheets
 from .gloss_create_infos import gloss, gloss_files
 
@@ -47,6 +48,15 @@ def patch_carried_comp(info, defines):
     _ints(info, "first_patch", "patch_count", "rays_each")
     info.local_group_size(64, 1, 1)
     return {"compute": ["data_lib", "patch_carried_comp"]}
+
+
+def patch_caught_comp(info, defines):
+    for name, value in (("MOST_CAUGHT", MOST_CAUGHT), ("NO_PATCH", NO_PATCH), ("NOTHING", NOTHING)):
+        info.define(name, str(value))
+    _image(info, 0, "ray_ends", pixel="R32F", access="READ+WRITE")
+    _ints(info, "patch_count", "rays_each")
+    info.local_group_size(64, 1, 1)
+    return {"compute": ["data_lib", "patch_caught_comp"]}
 
 
 def patch_iterate_comp(info, defines):

@@ -186,9 +186,9 @@ class Stages:
         )
 
     def iterate(self, bounce):
-        """(N, 3) irradiance after one iteration more, and the sums that judge it."""
-        sums = self.light.iterate(bounce)
-        return read(self.light.irradiance, self.light.count)[:, :3].astype(float), sums
+        """(N, 3) irradiance after one iteration more, the sums that judge it, and its luminance."""
+        sums, luminance = self.light.iterate(bounce)
+        return read(self.light.irradiance, self.light.count)[:, :3].astype(float), sums, luminance
 
     # Probes
     # ------------------------------------------------------------------------------------------------------------------

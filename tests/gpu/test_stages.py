@@ -13,7 +13,16 @@ import pytest
 from gridlight.core.conventions import LUMINANCE
 from gridlight.core.grid import Grid
 from gridlight.core.orientation import ShellVote
-from gridlight.core.patches import NO_PATCH, NOTHING, SAMPLES, Patches, direct_samples, light_parts
+from gridlight.core.patches import (
+    NO_PATCH,
+    NOTHING,
+    SAMPLES,
+    Patches,
+    direct_samples,
+    is_slow,
+    light_parts,
+    tail_squared,
+)
 from gridlight.core.reference_bake import ReferenceBake
 from gridlight.core.reference_bake import bake as reference_bake
 from gridlight.core.reference_light import bounce
@@ -207,14 +216,18 @@ def test_bounces(lit):
     scale = 1.0 / (direct + made.brought).max()  # of the sums of squares
     for index in range(4):
         expected = bounce(direct, made.brought, made.reflected, made.ends, last) if index else direct
-        found, sums = lit.iterate(index > 0)
+        found, sums, luminance = lit.iterate(index > 0)
         assert np.abs(found - expected).max() <= 1e-5 * expected.max()
         change, change_before = found - last, last - before
         squares = [
             seen @ (one * other).sum(axis=1) for one, other in ((found,) * 2, (change,) * 2, (change, change_before))
         ]
         np.testing.assert_allclose(sums[:3], np.array(squares) * scale**2, rtol=1e-3, atol=1e-5 * squares[0] * scale**2)
-        assert sums[3] == pytest.approx(seen @ (found @ LUMINANCE), rel=1e-4)
+        assert luminance == pytest.approx(seen @ (found @ LUMINANCE), rel=1e-4)
+        slow = is_slow(found, change, change_before, lit.light._settings.tolerance)
+        assert sums.slow == pytest.approx(seen @ slow / seen.sum(), abs=2e-3)
+        squares = [seen[~slow] @ part[~slow] for part in ((found**2).sum(axis=1), tail_squared(change, change_before))]
+        np.testing.assert_allclose(sums[4:], np.array(squares) * scale**2, rtol=2e-2)
         before, last = last, found
     lit.light.extrapolate(3.0)
     np.testing.assert_allclose(lit.iterate(True)[0], bounce_of(lit, last + 3 * (last - before)), rtol=1e-4, atol=1e-5)

@@ -4,7 +4,8 @@
 import numpy as np
 import pytest
 from gridlight.bake.convergence import AUTO_LIMIT, MANY_MODES, Convergence
-from gridlight.core.extrapolation import STATES, reduced_rank
+from gridlight.core.extrapolation import STATES, Sums, reduced_rank
+from gridlight.core.patches import PATIENCE, is_slow, tail_squared
 
 
 def run(operator, source, tolerance=2e-3, bounces=None):
@@ -15,7 +16,7 @@ def run(operator, source, tolerance=2e-3, bounces=None):
     while not watch.done:
         new = source + operator @ old if watch.iterations else source.copy()
         change = new - old
-        factor = watch.add(float(new @ new), float(change @ change), float(change @ (old - older)))
+        factor = watch.add(Sums(float(new @ new), float(change @ change), float(change @ (old - older))))
         assert watch.iterations < 2 * AUTO_LIMIT
         states.insert(0, new)
         if factor == MANY_MODES:
@@ -86,7 +87,7 @@ def test_light_that_arrives_with_the_first_bounce(ratio):
     older = old = 0.0
     while not watch.done:
         new = 1.0 + ratio * old if watch.iterations else 0.0
-        factor = watch.add(new * new, (new - old) ** 2, (new - old) * (old - older))
+        factor = watch.add(Sums(new * new, (new - old) ** 2, (new - old) * (old - older)))
         older, old = old, new + factor * (new - old)
     assert watch.converged and watch.iterations > 1
     assert old * (1 - ratio) == pytest.approx(1, rel=2e-3)
@@ -115,6 +116,48 @@ def test_many_slow_modes():
     limit = source / (1 - ratios)
     assert watch.converged and watch.iterations < 300
     assert np.linalg.norm(state - limit) / np.linalg.norm(limit) < 4e-3
+
+
+def fill_hollow(share, own_light):
+    """A room that loses a fifth of its light a bounce, and a hollow of ``share`` of the patches that loses 1/5000 and
+    gets as little from the room. Returns (state of the hollow against its limit, convergence)."""
+    watch, source, tolerance = Convergence(None, 2e-3), np.array([1.0, own_light]), 2e-3
+    operator, weight = np.array([[0.8, 0.0], [2e-4, 1 - 2e-4]]), np.array([1 - share, share])
+    states = [np.zeros(2)] * STATES
+    while not watch.done:
+        new = source + operator @ states[0] if watch.iterations else source.copy()
+        change, last = new - states[0], states[0] - states[1]
+        slow = is_slow(new[:, None], change[:, None], last[:, None], tolerance)
+        whole, of_others = weight, weight * ~slow
+        factor = watch.add(
+            Sums(
+                whole @ new**2,
+                whole @ change**2,
+                whole @ (change * last),
+                weight @ slow,
+                of_others @ new**2,
+                of_others @ tail_squared(change[:, None], last[:, None]),
+            )
+        )
+        states = [new, *states[: STATES - 1]]
+        if factor == MANY_MODES:
+            limit = reduced_rank(np.stack(states)[..., None])
+            states[0] = new if limit is None else limit[:, 0]
+        elif factor:
+            states[0] = new + factor * change
+    return states[0][1] / np.linalg.solve(np.eye(2) - operator, source)[1], watch
+
+
+def test_nobody_waits_for_a_minor_hollow():
+    filled, watch = fill_hollow(0.05, 0.0)
+    assert watch.converged and watch.has_hollows and watch.iterations <= PATIENCE + 2
+    assert 0.5 * PATIENCE / 5000 < filled < 2 * PATIENCE / 5000, "as after as many bounces, not as for ever"
+
+
+@pytest.mark.parametrize("share,own_light", [(0.4, 0.0), (0.05, 1.0)])
+def test_what_holds_much_or_is_much_is_waited_for(share, own_light):
+    _filled, watch = fill_hollow(share, own_light)
+    assert not watch.has_hollows and watch.iterations > 2 * PATIENCE
 
 
 def test_reduced_rank_is_exact_for_few_modes():

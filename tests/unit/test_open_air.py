@@ -68,6 +68,7 @@ def test_what_they_captured_is_kept_and_what_is_buried_is_filled():
         coefficients,
         np.ones((4, DEPTH_EDGE**2, 2), np.float32),
         np.ones((4, 3, 9, 3), np.float32),
+        np.array([3, 2]),
     )
     result = BakeResult()
     complete(result, grid, BakeSettings(), state, np.zeros((5, 3)), [outcome], "row")
@@ -77,3 +78,4 @@ def test_what_they_captured_is_kept_and_what_is_buried_is_filled():
     np.testing.assert_allclose(field.coefficients[:, 0, 0], [1, 7, 5, 3, 3], rtol=1e-5)
     assert not field.gradient[[2, 4]].any() and field.gradient[1].any()
     assert result.counts == {"total": 5, "active": 2, "culled": 3, "invalid": 0}
+    assert "1 of 2 probes stand in closed hollows" in result.warnings[0] and "(3, 0, 0)." in result.warnings[0]

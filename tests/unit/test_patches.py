@@ -6,7 +6,7 @@ import pytest
 from gridlight.core import patches
 from gridlight.core.cubemap import octahedral_encode, pack_normal
 from gridlight.core.grid import Grid
-from gridlight.core.patches import ANGLE, NO_PATCH, NOTHING, POINTS, SAMPLES, Patches
+from gridlight.core.patches import ANGLE, NO_PATCH, NOTHING, POINTS, SAMPLES, VARIANTS, Patches, caught
 
 GRID = Grid.from_bounds([-4] * 3, [4] * 3, (5, 5, 5))  # cells of 2 m; patches of 43 cm, a 32nd of the diagonal
 CELL = 8 * np.sqrt(3) / 32
@@ -85,12 +85,28 @@ def test_a_wall_cuts_a_cell_in_two():
     np.testing.assert_array_equal(patch, again)
 
 
-def test_hits_beyond_the_last_variant_join_it():
-    """Nobody sees anybody: three patches in one cell, the last of which takes all that is left."""
-    hits, found = hits_at(np.linspace([0.01, 0.01, 0], [0.1, 0.1, 0], 10)), Patches(GRID)
-    patch = found.bind(hits, far(hits), lambda items, numbers: np.zeros(len(items), bool))
-    assert found.count == 3
-    np.testing.assert_array_equal(np.bincount(patch), [1, 1, 8])
+def test_hits_that_see_no_leader_of_their_cell():
+    """Nobody sees anybody: one patch a variant, the last of which shows its light on texels beyond, but lies where its
+    leader does; rays beyond end on none."""
+    hits, nobody = hits_at(np.linspace([0.01, 0.01, 0], [0.1, 0.1, 0], 10)), lambda items, _: np.zeros(len(items), bool)
+    found = Patches(GRID)
+    patch = found.bind(hits, far(hits), nobody)
+    np.testing.assert_array_equal(np.bincount(patch), [1] * (VARIANTS - 1) + [11 - VARIANTS])
+    np.testing.assert_array_equal(found.points, np.repeat(hits[:VARIANTS, None], POINTS, axis=1))
+    ends = Patches(GRID).bind(hits, None, nobody)
+    np.testing.assert_array_equal(ends, [*range(VARIANTS), *[NO_PATCH] * (10 - VARIANTS)])
+
+
+def test_rays_that_only_a_handful_of_patches_exchange_are_caught():
+    ends = np.full((16, 8), NOTHING)
+    ends[0], ends[1] = 1, 0  # a slit
+    ends[2], ends[3] = 3, [2] * 7 + [0]  # one finds the way out, if only to another slit
+    ends[4], ends[5], ends[6] = 5, [4] * 4 + [6] * 4, [NO_PATCH] * 4 + [5] * 4
+    ends[7], ends[8] = 8, [7] * 7 + [NOTHING]
+    for i in range(5):
+        ends[9 + i] = 9 + (i + 1) % 5  # a ring of five: more than a handful
+    ends[14], ends[15] = 15, [2] + [14] * 7  # the first ray of others is not looked at, but one's own is
+    np.testing.assert_array_equal(np.flatnonzero(caught(ends)), [0, 1, 2, 3, 4, 5, 6, 14])
 
 
 def test_every_hit_is_asked_about_its_leader_once():
