@@ -114,6 +114,11 @@ def caught(ends: np.ndarray) -> np.ndarray:
     return result
 
 
+def without_caught(ends: np.ndarray) -> np.ndarray:
+    """Ends of rays (N, R) with the first ray of patches that are caught lost."""
+    return np.where(caught(ends)[:, None] & (np.arange(ends.shape[1]) == 0), NOTHING, ends)
+
+
 def tail_squared(change: np.ndarray, last_change: np.ndarray) -> np.ndarray:
     """(N,) |what is still to come|² of patches by their last changes (N, 3), if it comes within PATIENCE bounces."""
     square, before = (change**2).sum(axis=1), (last_change**2).sum(axis=1)

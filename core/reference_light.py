@@ -27,15 +27,14 @@ from .patches import (
     EMITTERS,
     MOST_ROUNDS,
     NO_PATCH,
-    NOTHING,
     RAYS,
     SAMPLES,
     Part,
     Patches,
-    caught,
     direct_samples,
     effort,
     light_parts,
+    without_caught,
 )
 from .rays import leave_surface, step_off
 from .reference_emitters import ReferenceEmitters
@@ -317,10 +316,9 @@ class ReferenceLight:
     def connect(self) -> None:
         """Traces rays between patches until they find no surface that is no patch yet."""
         rays_each = RAYS * self._effort
-        nothing, no_color = np.zeros((0, rays_each, 4)), np.zeros((0, rays_each, 3))
-        parts = [PatchRays(nothing, no_color, no_color, np.zeros((0, rays_each), int))]
-        ends = [np.zeros((0, rays_each), np.int64)]
-        stop = 0
+        nothing = np.zeros((0, rays_each, 4))
+        parts = [PatchRays(nothing, nothing[..., :3], nothing[..., :3], np.zeros((0, rays_each), int))]
+        ends, stop = [np.zeros((0, rays_each), np.int64)], 0
         for round_ in range(MOST_ROUNDS):
             start, stop = stop, self.patches.count
             if start == stop:
@@ -329,8 +327,7 @@ class ReferenceLight:
             parts.append(rays)
             ends.append(self._bind_ends(rays, round_).reshape(-1, rays_each))
         self.light_new_patches()
-        self._ends = np.concatenate(ends)
-        self._ends[caught(self._ends), 0] = NOTHING
+        self._ends = without_caught(np.concatenate(ends))
         self._brought = np.concatenate([rays.brought for rays in parts])
         self._reflected = np.concatenate([rays.reflected for rays in parts])
 
