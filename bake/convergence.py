@@ -100,8 +100,8 @@ class Convergence:
             self._slowest = max(self._slowest, step)
             self._lengths.clear()
             return step / (1.0 - step)
-        elif bounces < PATIENCE and _has_hollows(sums):
-            pass
+        elif bounces < 2 * PATIENCE and _has_hollows(sums):
+            pass  # the rest settles by itself
         elif len(self._lengths) >= STATES and self._lengths[-1] < _MOST_RATIO * self._lengths[-2]:
             # the first change after an extrapolation is not of its series
             self._slowest = max(self._slowest, min(self._lengths[-1] / self._lengths[-2], _MOST_RATIO))

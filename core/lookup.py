@@ -22,8 +22,8 @@ from .field import Field
 from .gradients import per_cell
 from .grid import Grid
 
-LEAST_WEIGHT = 1e-6  # of an active probe that does not see the point: decides only where none does
-INVALID_WEIGHT = 1e-9  # of probes inside solids, which carry their neighbours' light
+LEAST_WEIGHT = 1e-24  # of an active probe that does not see the point: decides only where none does
+INVALID_WEIGHT = 1e-27  # of probes inside solids, which carry their neighbours' light
 BEYOND = 0.5  # cells past the box that gradients lead on
 _SHARPNESS = 32  # power of the chance: the eighth lets through twice as much at walls, in open space both err alike
 LEAST_DISTANCE = 1e-6  # of the depth clamp: what a surface at no distance counts as
