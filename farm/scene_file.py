@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from ..core.camera import Camera
+from ..core.gloss import Gloss
+from ..core.light_links import Links
 from ..core.light_profiles import LightProfile
 from ..core.snapshot import Image, Light, Material, SceneSnapshot, World
 from . import container
@@ -61,7 +63,7 @@ class SceneReader:
         return SceneSnapshot(
             **arrays,
             object_names=document["object_names"],
-            materials=[Material(**_tuples(material)) for material in document["materials"]],
+            materials=[_material(material) for material in document["materials"]],
             images=images,
             lights=[_light(light) for light in document["lights"]],
             world=World(tuple(world["color"]), None if world["map"] is None else self._array(world["map"], before)),
@@ -97,6 +99,11 @@ def _plain(value):
     if isinstance(value, np.generic):
         return value.item()
     return value
+
+
+def _material(values: dict) -> Material:
+    gloss = values["gloss"] and Gloss(**_tuples(values["gloss"]))
+    return Material(**_tuples({**values, "gloss": gloss, "links": Links(**values["links"])}))
 
 
 def _light(values: dict) -> Light:
