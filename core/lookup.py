@@ -24,6 +24,7 @@ from .grid import Grid
 
 LEAST_WEIGHT = 1e-24  # of an active probe that does not see the point: decides only where none does
 INVALID_WEIGHT = 1e-27  # of probes inside solids, which carry their neighbours' light
+ON_BORDER = 1e-4  # of a cell: what is as near to a border lies on it, or rounding would choose between unseen and seen
 BEYOND = 0.5  # cells past the box that gradients lead on
 _SHARPNESS = 32  # power of the chance: the eighth lets through twice as much at walls, in open space both err alike
 LEAST_DISTANCE = 1e-6  # of the depth clamp: what a surface at no distance counts as
@@ -96,7 +97,9 @@ def _place(grid: Grid, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.n
     lattice = points @ to_lattice[:, :3].T + to_lattice[:, 3]
     clamped = np.clip(lattice, 0, resolution - 1)
     cell = np.minimum(clamped.astype(int), np.maximum(resolution - 2, 0))
-    return cell, clamped - cell, lattice - clamped
+    blend = clamped - cell
+    border = np.round(blend)
+    return cell, np.where(np.abs(blend - border) < ON_BORDER, border, blend), lattice - clamped
 
 
 def visibility(field: Field, nodes: np.ndarray, points: np.ndarray) -> np.ndarray:

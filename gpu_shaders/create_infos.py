@@ -11,7 +11,7 @@ from ..core.conventions import DEPTH_EDGE
 from ..core.emitters import CANDIDATES, EMITTER_BOXES
 from ..core.gradients import LEAST_COSINE
 from ..core.images import HALF_MAX
-from ..core.lookup import BEYOND, INVALID_WEIGHT, LEAST_DISTANCE, LEAST_WEIGHT
+from ..core.lookup import BEYOND, INVALID_WEIGHT, LEAST_DISTANCE, LEAST_WEIGHT, ON_BORDER
 from ..core.patches import SLOW
 
 NO_SURFACE = "1.0e30"
@@ -61,6 +61,7 @@ def _sheet_files(defines: dict) -> list[str]:
 def _lookup(info, first: int) -> int:
     info.define("DEPTH_EDGE", str(DEPTH_EDGE))
     info.define("LEAST_WEIGHT", repr(LEAST_WEIGHT))
+    info.define("ON_BORDER", repr(ON_BORDER))
     info.define("LEAST_DISTANCE", repr(LEAST_DISTANCE))
     info.define("INVALID_WEIGHT", repr(INVALID_WEIGHT))
     info.define("BEYOND", repr(BEYOND))

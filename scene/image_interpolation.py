@@ -12,7 +12,8 @@ import numpy as np
 _EDGE = 512  # of the finer grid, about
 _LEAST_GAIN, _MOST_GAIN = 2, 8
 _MOST_EDGE = 2048  # of images that are worth the memory
-_ALIKE = 0.005  # relative difference of means that nobody sees
+_ALIKE = 0.015  # relative difference of means that nobody sees
+_SAMPLES, _SAMPLE_EDGE = 8, 16  # pieces along each edge of a large image, of so many pixels, that tell whether to
 
 
 def finer_grid(encoded: np.ndarray, decode, interpolation: str, extension: str) -> np.ndarray | None:
@@ -23,17 +24,30 @@ def finer_grid(encoded: np.ndarray, decode, interpolation: str, extension: str) 
     edge = max(encoded.shape[:2])
     if interpolation == "Closest" or edge > _MOST_EDGE or edge < 2:
         return None
-    between = _resampled(encoded, 2, interpolation, extension)
-    mean = decode(encoded).mean(axis=(0, 1))
-    if (np.abs(decode(between).mean(axis=(0, 1)) - mean) <= _ALIKE * mean).all():
+    parts = _parts(encoded)
+    mean = decode(parts).mean(axis=(0, 1, 2))
+    beyond = extension if len(parts) == 1 else "EXTEND"  # what lies beyond a piece is not what lies beyond the image
+    between = decode(_resampled(parts, _LEAST_GAIN, interpolation, beyond)).mean(axis=(0, 1, 2))
+    if (np.abs(between - mean) <= _ALIKE * mean).all():
         return None
-    gain = int(np.clip(_EDGE // edge, _LEAST_GAIN, _MOST_GAIN))
-    return between if gain == _LEAST_GAIN else _resampled(encoded, gain, interpolation, extension)
+    return _resampled(encoded, int(np.clip(_EDGE // edge, _LEAST_GAIN, _MOST_GAIN)), interpolation, extension)
+
+
+def _parts(encoded: np.ndarray) -> np.ndarray:
+    """(N, h, w, C): pieces of ``encoded`` (H, W, C) all over it, or the whole of a small image."""
+    if max(encoded.shape[:2]) <= _SAMPLES * _SAMPLE_EDGE:
+        return encoded[None]
+    height, width = (min(size, _SAMPLE_EDGE) for size in encoded.shape[:2])
+    rows, columns = (
+        np.unique(np.linspace(0, size - part, _SAMPLES).astype(int))
+        for size, part in zip(encoded.shape, (height, width))
+    )
+    return np.stack([encoded[row : row + height, column : column + width] for row in rows for column in columns])
 
 
 def _resampled(pixels: np.ndarray, gain: int, interpolation: str, extension: str) -> np.ndarray:
-    """``pixels`` at the middles of ``gain`` × ``gain`` parts of every pixel."""
-    for axis in (0, 1):
+    """``pixels`` (…, H, W, C) at the middles of ``gain`` × ``gain`` parts of every pixel."""
+    for axis in (-3, -2):
         count = pixels.shape[axis]
         position = (np.arange(gain * count) + 0.5) / gain - 0.5
         first = np.floor(position).astype(int)

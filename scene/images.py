@@ -16,10 +16,15 @@ MAX_EDGE = 1024
 
 _CHUNK_ROWS = 256  # rows converted at a time, so that an 8192² texture does not need its float copies all at once
 
+
+def _decoded_srgb(steps: int) -> np.ndarray:
+    """(steps,) float32 linear values of as many stored ones, 0..1 (IEC 61966-2-1)."""
+    stored = np.arange(steps) / (steps - 1)
+    return np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
 _ENCODED = np.arange(256) / 255.0
-_SRGB_TO_LINEAR = np.where(_ENCODED <= 0.04045, _ENCODED / 12.92, ((_ENCODED + 0.055) / 1.055) ** 2.4).astype(
-    np.float32
-)
+_SRGB_TO_LINEAR, _FINE_TO_LINEAR = _decoded_srgb(256), _decoded_srgb(1 << 16)
 _BYTE_TO_LINEAR = _ENCODED.astype(np.float32)
 
 
@@ -142,7 +147,7 @@ class ImageTable:
 
 def _srgb_to_linear(values: np.ndarray) -> np.ndarray:
     """float32 0..1 decoded."""
-    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    return _FINE_TO_LINEAR.take((values * 65535.0 + 0.5).astype(np.uint16), mode="clip")
 
 
 def _to_rgba(encoded: np.ndarray, table: np.ndarray | None, image: bpy.types.Image) -> np.ndarray:

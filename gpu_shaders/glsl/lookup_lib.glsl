@@ -92,6 +92,8 @@ ivec3 lookup_cell(vec3 point, vec3 normal, out float weights[8], out vec4 lead)
   vec3 lattice = lattice_position(point, beyond);
   ivec3 cell = first_corner(lattice);
   vec3 blend = lattice - vec3(cell);
+  vec3 border = floor(blend + 0.5);
+  blend = mix(blend, border, lessThan(abs(blend - border), vec3(ON_BORDER)));
   lead = vec4(0.5 * blend + clamp(beyond, -BEYOND, BEYOND), 0.0);
   vec3 seen_point = point + normal * grid_info[4].x;
   float plain[8];

@@ -203,7 +203,7 @@ def test_field_with_what_is_mirrored(stages, reflected):
     """The projection reads both parts of a texel's light."""
     found, expected, surfaces, _same = reflected
     stages.connect()
-    irradiance, _sums = stages.iterate(False)
+    irradiance, *_ = stages.iterate(False)
     ends = found[:, :, 1:, 3].astype(int).ravel()
     gpu_sent = TexelReflections(
         expected.diffuse,

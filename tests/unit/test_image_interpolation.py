@@ -27,6 +27,14 @@ def test_mean_between_two_values():
     assert square(finer_grid(columns, square, "Cubic", "REPEAT")).mean() < 0.3, "a spline is flatter"
 
 
+def test_large_images_are_judged_by_pieces():
+    """Noise is found in an image of which pieces are looked at, and a step at the rims of pieces is none."""
+    noise = np.random.default_rng(3).random((300, 500, 3)).astype(np.float32)
+    assert finer_grid(noise, square, "Linear", "REPEAT").shape == (600, 1000, 3)
+    slope = np.linspace(0, 1, 300, dtype=np.float32)[:, None, None] * np.ones((1, 500, 3), np.float32)
+    assert finer_grid(slope, square, "Linear", "REPEAT") is None
+
+
 @pytest.mark.parametrize("extension", ["REPEAT", "EXTEND", "CLIP", "MIRROR"])
 def test_rims(extension):
     """Beyond the rim of a bright pixel lies what the extension says."""
