@@ -59,7 +59,8 @@ def test_pixels_of_the_baked_room_agree_with_eval(browse, run_gridlight, room):
 def test_refined_they_agree_at_the_surface_itself(browse, run_gridlight, room):
     """With eight times smaller cells three.js looks so close to the walls that no shift needs to be allowed for.
 
-    What is left is visibility: in corners ``eval`` takes a probe for hidden that looks along the wall, and asks others.
+    What is left is visibility: in corners ``eval`` takes a probe for hidden that looks along the wall, and asks others,
+    within less than a fine cell.
     """
     probes, folder = room / "bake/probes.exr", room / "fine"
     done = run_gridlight("export", probes, "--to", "three", "-o", folder, "--refine", 8, "--scene", room / "room.blend")
@@ -70,7 +71,7 @@ def test_refined_they_agree_at_the_surface_itself(browse, run_gridlight, room):
     expected = evaluated(run_gridlight, room, places[lit] @ Y_UP, normals[lit] @ Y_UP)
     error = np.abs(found[lit] - expected).max(axis=1) / expected.max(axis=1)
     within = [(error < limit).mean() for limit in (0.02, 0.05)]
-    assert within[0] > 0.97 and within[1] > 0.99 and error.max() < 0.1, f"{within}, worst {error.max():.3g}"
+    assert within[0] > 0.95 and within[1] > 0.99 and error.max() < 0.15, f"{within}, worst {error.max():.3g}"
 
 
 def test_the_glb_is_valid(packages, node, room):
