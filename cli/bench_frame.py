@@ -44,7 +44,7 @@ def table(summary: dict) -> list[str]:
     if summary["longest_steps"]:
         lines += [
             "",
-            "Bakes beside the interface: a timer event takes steps for 30 ms. Longest warm step, ms, by phase",
+            "Bakes beside the interface: a timer event takes steps for 20 ms. Longest warm step, ms, by phase",
         ]
         lines += bench_table.columns([["phase", "ms"], *[[k, _ms(v)] for k, v in summary["longest_steps"].items()]])
     for row in summary["rows"]:
