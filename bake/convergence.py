@@ -100,9 +100,11 @@ class Convergence:
             self._slowest = max(self._slowest, step)
             self._lengths.clear()
             return step / (1.0 - step)
-        elif bounces < 2 * PATIENCE and _has_hollows(sums):
-            pass  # the rest settles by itself
-        elif len(self._lengths) >= STATES and self._lengths[-1] < _MOST_RATIO * self._lengths[-2]:
+        elif (
+            len(self._lengths) >= STATES
+            and self._lengths[-1] < _MOST_RATIO * self._lengths[-2]
+            and (bounces >= 2 * PATIENCE or not _has_hollows(sums))  # what is no hollow settles by itself
+        ):
             # the first change after an extrapolation is not of its series
             self._slowest = max(self._slowest, min(self._lengths[-1] / self._lengths[-2], _MOST_RATIO))
             self._lengths.clear()

@@ -11,7 +11,7 @@ import numpy as np
 
 _EDGE = 512  # of the finer grid, about
 _LEAST_GAIN, _MOST_GAIN = 2, 8
-_MOST_EDGE = 2048  # of images that are worth the memory
+MOST_EDGE = 2048  # of images that are worth the memory
 _ALIKE = 0.015  # relative difference of means that nobody sees
 _SAMPLES, _SAMPLE_EDGE = 8, 16  # pieces along each edge of a large image, of so many pixels, that tell whether to
 
@@ -22,7 +22,7 @@ def finer_grid(encoded: np.ndarray, decode, interpolation: str, extension: str) 
 
     ``interpolation`` and ``extension`` are the node's."""
     edge = max(encoded.shape[:2])
-    if interpolation == "Closest" or edge > _MOST_EDGE or edge < 2:
+    if interpolation == "Closest" or edge > MOST_EDGE or edge < 2:
         return None
     parts = _parts(encoded)
     mean = decode(parts).mean(axis=(0, 1, 2))

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from ..core.snapshot import Image
-from .image_interpolation import finer_grid
+from .image_interpolation import MOST_EDGE, finer_grid
 from .notices import Notices
 
 # A probe's texel sees a patch of surface, never a single pixel of a large texture: images are box-filtered down to this
@@ -118,6 +118,8 @@ class ImageTable:
         """The pixels of an opaque sRGB image with those between them; None where that makes no difference."""
         size: tuple[int, int] = image.size
         width, height = size
+        if max(size) > MOST_EDGE:  # not even read a second time
+            return None
         encoded = np.empty((height, width, image.channels), np.float32)
         image.pixels.foreach_get(encoded.ravel())
         if encoded.shape[2] == 4 and bool((encoded[..., 3] != 1).any()):
