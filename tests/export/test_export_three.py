@@ -68,7 +68,9 @@ def test_agrees_with_eval_where_its_shader_looks(tmp_path, placement, linear, pr
     looked_at = points + normals @ Y_UP.T * probes.spacing * 0.5 @ Y_UP
     expected = lookup.irradiance(field, looked_at, normals)
     found = probes.irradiance(points @ Y_UP.T, normals @ Y_UP.T)
-    inside = (found != 0).any(axis=1)
+    lattice = looked_at @ field.grid.world_to_lattice()[:, :3].T + field.grid.world_to_lattice()[:, 3]
+    on_border = (np.abs(lattice - np.round(lattice)) < lookup.ON_BORDER).any(axis=1)  # eval takes the border's corners
+    inside = (found != 0).any(axis=1) & ~on_border
     assert inside.sum() > 300
     tolerance = expected.max() * (HALF if precision == "half" else 3e-6)
     np.testing.assert_allclose(found[inside], expected[inside], atol=tolerance)
