@@ -31,12 +31,41 @@ _RAYS_AT_ONCE = 1 << 20
 _UNSEEN = 1e-6  # weight of patches that no probe sees where iterations are compared: light may still be on its way
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Rays:
-    """Where ``count`` rays end, see patch_rays_comp.glsl."""
+    """Rays to trace: ``each`` of every one of ``count`` patches or texels of ``places`` from number ``first`` on.
+
+    What they ``reflected`` (an element a ray) and what light they ``brought`` (an element a patch or texel) is written
+    to arrays that begin with number 0 of ``places``. Rays of more than one segment go on as paths, and are lit where
+    they bounce. ``first_key``: what ``places`` number 0 is among all, for its random numbers."""
+
+    places: Places
+    first: int
+    count: int
+    each: int
+    reflected: gpu.types.GPUTexture
+    brought: gpu.types.GPUTexture
+    segments: int = 1
+    first_key: int = 0
+
+    @property
+    def total(self) -> int:
+        return self.count * self.each
+
+
+@dataclass(frozen=True)
+class _Receivers:
+    """``count`` patches or texels that light reaches: without a bounce (``direct``: irradiance), with their rays
+    (``brought``), and from the patches on which those end (``ends``, of which ``reflected`` comes back).
+
+    Linear arrays of an element each, the last two of ``rays_each`` times as many."""
 
     count: int
-    hits: Places
+    direct: gpu.types.GPUTexture
+    brought: gpu.types.GPUTexture
+    ends: gpu.types.GPUTexture
+    reflected: gpu.types.GPUTexture
+    rays_each: int
 
 
 class PatchLight:
@@ -98,9 +127,10 @@ class PatchLight:
         stop = 0
         for round_ in range(MOST_ROUNDS - 1 if is_direct else 0, MOST_ROUNDS):
             start, stop = stop, self.count
-            for first, rays in self._trace_patches(start, stop):
-                ends = self.patches.bind_ends(rays.hits, rays.count, round_)
-                copy_elements(ends, self._ends.reserve(stop * self._rays_each), "R32F", rays.count, first)
+            for rays, hits in self._trace_patches(start, stop):
+                found = self.patches.bind_ends(hits, rays.total, round_)
+                ends = self._ends.reserve(stop * rays.each)
+                copy_elements(found, ends, "R32F", rays.total, rays.first * rays.each)
                 yield
             if stop == self.count:
                 break
@@ -133,74 +163,59 @@ class PatchLight:
         """(rays,) bool: does light come back?"""
         return read(self._reflected.texture, self.count * self._rays_each)[:, :3].any(axis=1)
 
-    def _trace_patches(self, start: int, stop: int) -> Iterator[tuple[int, _Rays]]:
-        """The rays of patches ``start`` .. ``stop``, part by part: number of the first ray, what the part found."""
+    def _trace_patches(self, start: int, stop: int) -> Iterator[tuple[_Rays, Places]]:
+        """The rays of patches ``start`` .. ``stop``, part by part, and where they end."""
         at_once = max(1, _RAYS_AT_ONCE // self._rays_each)
         reflected, brought = self._reflected.reserve(stop * self._rays_each), self._brought.reserve(stop)
         for first in range(start, stop, at_once):
             count = min(stop - first, at_once)
-            rays = self._trace(self.patches.places, first, count, self._rays_each, reflected, brought)
-            yield first * self._rays_each, rays
+            rays = _Rays(self.patches.places, first, count, self._rays_each, reflected, brought)
+            yield rays, self._trace(rays)
 
-    def _trace(
-        self,
-        places: Places,
-        first: int,
-        count: int,
-        rays_each: int,
-        reflected,
-        brought,
-        segments=1,
-        first_key=0,
-    ) -> _Rays:
-        """``rays_each`` rays of each of ``count`` patches or texels from ``first`` on of ``places``.
-
-        What they reflect and bring along goes into arrays of all rays and of all patches."""
-        rays = count * rays_each
-        hits, carried = (scratch(rays, "rays") for _ in range(2))
-        sheets = scratch(rays, "rays", "R32F") if self._scene.has_sheets else None
-        is_path = segments > 1
-        defines = (
-            self._scene.surface_defines
-            | (self._scene.light_defines if is_path or self._scene.has_gloss else {})
-            | self._scene.sheet_defines
-            | self._scene.gloss_defines
-        )
-        shader = program(
-            "patch_rays_comp",
-            FACE=self._settings.face,
-            POINTS=places.each,
-            SEGMENTS=segments,
-            **(defines | {"HAS_IMAGES": self._scene.has_images}),
-        )
-        self._scene.bind_surfaces(shader)
-        if is_path:
-            self._scene.bind_lights(shader)
-        self._scene.bind_gloss(shader, lights=not is_path)
-        self._scene.bind_sheets(shader, places.sheets)
+    def _trace(self, rays: _Rays) -> Places:
+        """Where ``rays`` end, an element each, see patch_rays_comp.glsl."""
+        hits, carried = (scratch(rays.total, "rays") for _ in range(2))
+        sheets = scratch(rays.total, "rays", "R32F") if self._scene.has_sheets else None
+        shader = self._bind_ray_scene(rays)
+        shader.uniform_sampler("patch_points", rays.places.points)
+        shader.uniform_sampler("world_texels", self.world_texels)
+        for name, texture in (("hits", hits), ("carried", carried), ("reflected", rays.reflected)):
+            shader.image(name, texture)
         if sheets is not None:
             shader.image("hit_sheets", sheets)
-        shader.uniform_sampler("patch_points", places.points)
-        shader.uniform_sampler("world_texels", self.world_texels)
-        for name, texture in (("hits", hits), ("carried", carried), ("reflected", reflected)):
-            shader.image(name, texture)
         for name, value in (
-            ("first_ray", first * rays_each),
-            ("ray_count", rays),
-            ("rays_each", rays_each),
-            ("first_key", first_key),
+            ("first_ray", rays.first * rays.each),
+            ("ray_count", rays.total),
+            ("rays_each", rays.each),
+            ("first_key", rays.first_key),
             ("seed", self._settings.seed),
         ):
             shader.uniform_int(name, (value,))
-        dispatch_linear(shader, rays)
+        dispatch_linear(shader, rays.total)
         shader = program("patch_carried_comp")
         shader.uniform_sampler("carried", carried)
-        shader.image("brought", brought)
-        shader.uniform_int("first_patch", (first,))
-        shader.uniform_int("patch_count", (count,))
-        shader.uniform_int("rays_each", (rays_each,))
-        dispatch_linear(shader, count)
-        return _Rays(rays, Places(hits, 1, sheets))
+        shader.image("brought", rays.brought)
+        for name, value in (("first_patch", rays.first), ("patch_count", rays.count), ("rays_each", rays.each)):
+            shader.uniform_int(name, (value,))
+        dispatch_linear(shader, rays.count)
+        return Places(hits, 1, sheets)
+
+    def _bind_ray_scene(self, rays: _Rays):
+        """The shader that traces ``rays``, with what it reads of the scene bound: lamps only where rays are lit."""
+        scene, is_path = self._scene, rays.segments > 1
+        defines = scene.surface_defines | scene.sheet_defines | scene.gloss_defines
+        if is_path or scene.has_gloss:
+            defines = defines | scene.light_defines
+        defines = defines | {"HAS_IMAGES": scene.has_images}
+        shader = program(
+            "patch_rays_comp", FACE=self._settings.face, POINTS=rays.places.each, SEGMENTS=rays.segments, **defines
+        )
+        scene.bind_surfaces(shader)
+        if is_path:
+            scene.bind_lights(shader)
+        scene.bind_gloss(shader, lights=not is_path)
+        scene.bind_sheets(shader, rays.places.sheets)
+        return shader
 
     # Bounces
     # ------------------------------------------------------------------------------------------------------------------
@@ -214,16 +229,9 @@ class PatchLight:
         """The first irradiance, of direct light, or one bounce more. Returns sums over patches in probes' sight, all to
         one scale; of their luminance to none."""
         self._irradiance.insert(0, self._irradiance.pop())
-        self._bounce(
-            self.direct,
-            self._brought.texture,
-            self._reflected.texture,
-            self._ends.texture,
-            self._rays_each,
-            self.count,
-            self._irradiance[0],
-            bounce,
-        )
+        brought, ends, reflected = self._brought.texture, self._ends.texture, self._reflected.texture
+        patches = _Receivers(self.count, self.direct, brought, ends, reflected, self._rays_each)
+        self._bounce(patches, self._irradiance[1], self._irradiance[0], bounce)
         return self._compare(*self._irradiance[:3])
 
     def _compare(self, new, old, older) -> tuple[Sums, float]:
@@ -243,24 +251,26 @@ class PatchLight:
         (energy, change, overlap, luminance), (scale, *others) = read(self._change, 2).tolist()
         return Sums(energy, change, overlap, *others), luminance / scale
 
-    def _bounce(
-        self, direct, brought, reflected, ends, rays_each: int, count: int, target, bounce: bool = True
-    ) -> None:
-        """Irradiance of ``count`` patches from the newest irradiance at the ends of their rays, into ``target``."""
+    def _bounce(self, receivers: _Receivers, source, target, bounce: bool = True) -> None:
+        """Irradiance of ``receivers`` into ``target``: what reaches them without a bounce, and with ``bounce`` what
+        patches of irradiance ``source`` send."""
         shader = program("patch_iterate_comp")
         for name, texture in (
-            ("direct", direct),
-            ("brought", brought),
-            ("reflected", reflected),
-            ("ray_ends", ends),
-            ("irradiance_in", self._irradiance[1] if target is self._irradiance[0] else self._irradiance[0]),
+            ("direct", receivers.direct),
+            ("brought", receivers.brought),
+            ("reflected", receivers.reflected),
+            ("ray_ends", receivers.ends),
+            ("irradiance_in", source),
         ):
             shader.uniform_sampler(name, texture)
         shader.image("irradiance_out", target)
-        shader.uniform_int("patch_count", (count,))
-        shader.uniform_int("rays_each", (rays_each,))
-        shader.uniform_int("bounce", (int(bounce),))
-        dispatch_linear(shader, count)
+        for name, value in (
+            ("patch_count", receivers.count),
+            ("rays_each", receivers.rays_each),
+            ("bounce", int(bounce)),
+        ):
+            shader.uniform_int(name, (value,))
+        dispatch_linear(shader, receivers.count)
 
     def extrapolate(self, factor: float) -> None:
         """irradiance += factor · (irradiance − irradiance of the iteration before)."""
@@ -307,7 +317,7 @@ class PatchLight:
         chosen = numbers(reflects, "texels")
         run(self._direct.light(texels, chosen, [(0, len(reflects), settings.samples)], direct, first_key))
         reflected, brought = scratch(count * rays_each, "rays"), scratch(count, "texels")
-        rays = self._trace(texels, 0, count, rays_each, reflected, brought, settings.gather, first_key)
-        ends = self.patches.bind_ends(rays.hits, rays.count, MOST_ROUNDS - 1)
-        self._bounce(direct, brought, reflected, ends, rays_each, count, result)
+        rays = _Rays(texels, 0, count, rays_each, reflected, brought, settings.gather, first_key)
+        ends = self.patches.bind_ends(self._trace(rays), rays.total, MOST_ROUNDS - 1)
+        self._bounce(_Receivers(count, direct, brought, ends, reflected, rays_each), self._irradiance[0], result)
         return result
