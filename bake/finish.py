@@ -87,8 +87,7 @@ def _warn_of_hollows(result: BakeResult, grid: Grid, states: np.ndarray, outcome
     hollow = hollow[states[hollow] == ACTIVE]
     if not len(hollow):
         return
-    nx, ny, _ = grid.resolution
-    named = ", ".join(f"({node % nx}, {node // nx % ny}, {node // (nx * ny)})" for node in hollow[:_MOST_NAMED])
+    named = ", ".join(str(grid.coordinates(node)) for node in hollow[:_MOST_NAMED])
     more = f" and {len(hollow) - _MOST_NAMED} more" if len(hollow) > _MOST_NAMED else ""
     result.warnings.append(
         f"{grid.name}: {len(hollow)} of {(states == ACTIVE).sum()} probes stand in closed hollows that light hardly "

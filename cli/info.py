@@ -7,6 +7,7 @@ import numpy as np
 
 from ..core.conventions import ACTIVE, LUMINANCE
 from ..core.field import state_counts
+from ..core.probe_states import invalid_counts, invalid_in_words
 from ..core.ringing import ringing
 from ..core.spherical_harmonics import Y0
 from ..formats import probe_file
@@ -34,6 +35,7 @@ def summarise(field) -> dict:
     summary = {
         **field.metadata,
         "probes": state_counts(field.state),
+        "invalid_because": invalid_counts([field]),
         "bounds": {"min": corners[:, :3].min(axis=0).tolist(), "max": corners[:, :3].max(axis=0).tolist()},
         "spacing": grid.cell_size().tolist(),
         "mean_radiance": None
@@ -50,12 +52,13 @@ def _text(path: str, summary: dict) -> str:
         return " × ".join(f"{value:.4g}" for value in values)
 
     probes, light = summary["probes"], summary["mean_radiance"]
+    why = f": {invalid_in_words(summary['invalid_because'])}" if probes["invalid"] else ""
     low, high = (" ".join(f"{value:.4g}" for value in summary["bounds"][corner]) for corner in ("min", "max"))
     major, minor = summary["format_version"]
     lines = [
         f"{path}: probe file {major}.{minor}, volume '{summary['volume']['name']}'",
         f"  probes     {triple(summary['resolution'])} = {probes['total']}: {probes['active']} active, "
-        f"{probes['culled']} culled, {probes['invalid']} invalid",
+        f"{probes['culled']} culled, {probes['invalid']} invalid{why}",
         f"  box        {low}  to  {high} m, spacing {triple(summary['spacing'])} m",
         f"  bands      {summary['bands']}",
     ]

@@ -13,6 +13,7 @@ import numpy as np
 from ..bake.result import BakeResult, is_unsettled
 from ..core.conventions import ACTIVE
 from ..core.field import state_counts
+from ..core.probe_states import invalid_counts
 from ..core.ringing import ringing
 from ..core.settings import BakeSettings
 from ..formats import probe_file, probe_metadata
@@ -118,6 +119,7 @@ def _summary(results, device: str, settings: BakeSettings, stopwatch: RunClock, 
     return {
         **({"error": _worst_error(results)} if any(result.error for result in results) else {}),
         "probes": state_counts(states),
+        "invalid_because": invalid_counts([result.field for result in results]),
         "iterations": max(result.iterations for result in results),
         "converged": all(result.converged for result in results),
         "ringing": ringing(lit).as_dict(),

@@ -86,6 +86,11 @@ class Grid:
         this is a part."""
         return self.center
 
+    def coordinates(self, node: int) -> tuple[int, int, int]:
+        """(i, j, k) of the node with flat index ``node``."""
+        nx, ny, _ = self.resolution
+        return int(node % nx), int(node // nx % ny), int(node // (nx * ny))
+
     def lattice(self) -> np.ndarray:
         """(count, 3) integer node coordinates (i, j, k) in flat order."""
         nx, ny, nz = self.resolution

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 _LIT_SHARE = 0.02  # of the back faces seen: a spot lights little of a room, less than this is a leak of light
-_MOST = 0.5  # of the sphere
+MOST_BEHIND = 0.5  # of the sphere: probes that see more back faces than that do not stand in a room
 _MOST_PAIRS = 1 << 22  # of probes and objects that are counted without sorting
 _FRONT_SHARE = 0.02  # of a probe's directions: less is no surface that anybody beside the probe could light
 _OPEN_SHARE = 0.01  # of a probe's directions that see background: the inside of a solid sees none
@@ -30,7 +30,7 @@ def inside_solid(shares: np.ndarray, light_elsewhere: bool = False) -> np.ndarra
     solid, background, lit, behind = shares.T
     dark = (lit == 0) & (lit.any() or light_elsewhere)
     void = (behind > 0) & (1 - background - behind < _FRONT_SHARE)
-    return (solid > _MOST) | (dark & (void | ((behind > _MOST) & (background == 0))))
+    return (solid > MOST_BEHIND) | (dark & (void | ((behind > MOST_BEHIND) & (background == 0))))
 
 
 class ShellVote:

@@ -20,6 +20,7 @@ import numpy as np
 
 from ..core.conventions import ACTIVE, LUMINANCE
 from ..core.field import Field
+from ..core.probe_states import CULLED_MEANS, invalid_counts, invalid_in_words
 from ..core.ringing import ringing
 from ..core.spherical_harmonics import irradiance
 from . import report_figures as figures
@@ -128,11 +129,12 @@ def page_header(title: str, facts: list[str]) -> str:
 
 def _cards(report: ReportData) -> str:
     cards = []
+    invalid = invalid_in_words(invalid_counts([volume.field for volume in report.volumes]))
     for key, text in (
         ("total", "probes in all"),
         ("active", "active"),
-        ("culled", "culled, light nothing"),
-        ("invalid", "invalid, inside solids or in the dark behind walls"),
+        ("culled", CULLED_MEANS),
+        ("invalid", f"invalid: {invalid}"),
     ):
         if key in report.counts:
             cards.append((f"{report.counts[key]:,}".replace(",", " "), text, ""))

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..core.conventions import ACTIVE, CULLED, INVALID, LUMINANCE
 from ..core.field import Field
+from ..core.probe_states import CULLED_MEANS, invalid_counts, invalid_in_words
 from ..core.spherical_harmonics import Y0, irradiance
 from .report_figures import number
 
@@ -100,7 +101,7 @@ def slices_html(field: Field, block: str) -> str:
 def _panel(field: Field, quantity: Quantity, shown: bool) -> str:
     nz = field.grid.resolution[2]
     if quantity.colours is not None:
-        colours, scale, hover = quantity.colours, _legend_states() if quantity.key == "state" else "", ""
+        colours, scale, hover = quantity.colours, _legend_states(field) if quantity.key == "state" else "", ""
         if quantity.key == "colour":
             scale = '<p class="legend">brightest probe at white, sRGB</p>'
     else:
@@ -178,10 +179,11 @@ def _state_colours(state: np.ndarray) -> np.ndarray:
     return colours
 
 
-def _legend_states() -> str:
-    names = (("active", "rgb(64 160 110)"), ("invalid: inside solid geometry", f"rgb{INVALID_COLOUR}"))
+def _legend_states(field: Field) -> str:
+    invalid = f"invalid: {invalid_in_words(invalid_counts([field]))}"
+    names = (("active", "rgb(64 160 110)"), (invalid, f"rgb{INVALID_COLOUR}"))
     marks = "".join(f'<span><i style="background:{colour}"></i>{name}</span>' for name, colour in names)
-    return f'<p class="legend">{marks}<span><i class="hatch"></i>culled: lights no surface</span></p>'
+    return f'<p class="legend">{marks}<span><i class="hatch"></i>{CULLED_MEANS}</span></p>'
 
 
 def _atlas(colours: np.ndarray, resolution: tuple[int, int, int]) -> np.ndarray:

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import bpy
 
+from ..core.conventions import ACTIVE
+from ..core.probe_states import describe
 from ..scene.probe_objects import INDEX_PROPERTY, VOLUME_PROPERTY
 from . import names
 
@@ -51,10 +53,14 @@ class GRIDLIGHT_OT_pick_probe(bpy.types.Operator):
         if found is None:
             return {"PASS_THROUGH"}
         volume, node = found
+        field = session.gpu.fields[volume].field
+        words = f"Probe {field.grid.coordinates(node)} of '{volume}': {describe(field, node)}"
         probe = probe_object(context.scene, volume, node)
         if probe is None:
-            self.report({"INFO"}, f"Probe {node} of '{volume}' is no object: place the volume's probes to edit them")
+            is_active = field.state[node] == ACTIVE
+            self.report({"INFO"}, f"{words}. Place the volume's probes to edit it" if is_active else words)
             return {"CANCELLED"}
+        self.report({"INFO"}, words)
         if not self.extend:
             for item in context.selected_objects:
                 item.select_set(False)

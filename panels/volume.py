@@ -6,11 +6,12 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ..core.probe_states import invalid_in_words
 from ..operators import names
 from ..operators.libraries import library_of
 from ..operators.volume_choice import active_volume, volumes_of
 from ..scene import probe_objects
-from ..scene.field_storage import has_moved, stored_counts
+from ..scene.field_storage import has_moved, stored_counts, stored_invalid
 from ..scene.volumes import resolution_of
 from .sidebar_panel import SidebarPanel, paragraph
 
@@ -59,7 +60,7 @@ class GRIDLIGHT_PT_probes(SidebarPanel, bpy.types.Panel):
         layout = self.layout
         volume = active_volume(context)
         if volume is not None:
-            _counts(layout, context.scene, volume)
+            _counts(layout, context, volume)
             _placed(layout, context, volume)
         row = layout.row(align=True)
         row.operator(names.PLACE_PROBES, text="Place", icon="EMPTY_AXIS")
@@ -91,8 +92,9 @@ def _grid(layout, volume) -> None:
         row.operator(names.FIT_VOLUME, text=title).fit = fit
 
 
-def _counts(layout, scene, volume) -> None:
+def _counts(layout, context, volume) -> None:
     """From the bake; before it, as far as placing tells."""
+    scene = context.scene
     total = int(np.prod(resolution_of(volume)))
     counts = stored_counts(volume)
     placed = probe_objects.placed_count(scene, volume)
@@ -110,6 +112,9 @@ def _counts(layout, scene, volume) -> None:
         sub = cell.column()
         sub.active = False
         sub.label(text=name)
+    invalid = stored_invalid(volume)
+    if invalid and known["invalid"] != "–":
+        paragraph(layout, context, f"Invalid: {invalid_in_words(invalid)}", "INFO")
 
 
 def _placed(layout, context, volume) -> None:

@@ -14,11 +14,12 @@ import json
 import bpy
 import numpy as np
 
-from ..core.conventions import ACTIVE, CULLED, DEPTH_EDGE, INVALID
+from ..core.conventions import ACTIVE, DEPTH_EDGE
 from ..core.errors import InputError
-from ..core.field import Field
+from ..core.field import Field, state_counts
 from ..core.gradients import gradient_bands
 from ..core.grid import Grid
+from ..core.probe_states import invalid_counts
 from .volumes import box_of, resolution_of
 
 POINTER = "gridlight_field"
@@ -59,6 +60,7 @@ def store_field(volume_object: bpy.types.Object, field: Field, scene_hash: str, 
     text["bands"] = field.bands
     text["metadata"] = json.dumps(metadata)
     text["details"] = json.dumps(details or {})
+    text["invalid"] = json.dumps(invalid_counts([field]))
     for name, (kind, _) in _ARRAYS.items():
         text[name] = np.ascontiguousarray(getattr(field, name), kind).tobytes()
     text.from_string(_in_words(volume_object, field, metadata))
@@ -119,9 +121,13 @@ def stored_counts(volume_object: bpy.types.Object) -> dict[str, int] | None:
     text = stored_text(volume_object)
     if text is None:
         return None
-    state = np.frombuffer(text.get("state", b""), np.uint8)
-    names = {"active": ACTIVE, "culled": CULLED, "invalid": INVALID}
-    return {"total": len(state), **{name: int((state == value).sum()) for name, value in names.items()}}
+    return state_counts(np.frombuffer(text.get("state", b""), np.uint8))
+
+
+def stored_invalid(volume_object: bpy.types.Object) -> dict[str, int]:
+    """Number of invalid probes by reason (core/probe_states.py); empty where there are none, or nobody noted why."""
+    text = stored_text(volume_object)
+    return json.loads(text.get("invalid", "{}")) if text is not None else {}
 
 
 def has_moved(volume_object: bpy.types.Object) -> bool:

@@ -9,6 +9,8 @@ import gpu
 from gpu_extras.batch import batch_for_shader
 
 from ..core.conventions import CULLED, INVALID
+from ..core.field import Field
+from ..core.probe_states import CULLED_MEANS, invalid_counts, invalid_in_words
 from .sessions import SceneSession
 
 _SIZE, _LEADING, _MARGIN = 12, 1.5, 16
@@ -18,17 +20,8 @@ _OUTLINE = 6  # the kind of shadow
 # As viewport_data_lib.glsl colours them.
 HEAT = [(0.08, 0.1, 0.45), (0.1, 0.6, 0.85), (0.2, 0.75, 0.25), (0.95, 0.85, 0.15), (0.85, 0.1, 0.08)]
 HEAT_END_PERCENT = 20
-_STATES = [
-    ((0.2, 0.75, 0.3), "sees free space"),
-    ((0.95, 0.5, 0.05), "sees back faces"),
-    ((0.8, 0.08, 0.1), "invalid: in a solid"),
-    ((0.25, 0.35, 0.65), "culled: lights nothing"),
-]
-# Spheres of probes that have no light of their own, as viewport_data_lib.glsl draws them.
-_MARKS = [
-    (CULLED, (0.25, 0.25, 0.25), "probe is culled: lights nothing"),
-    (INVALID, (0.66, 0.15, 0.15), "probe is invalid: in a solid"),
-]
+_FREE, _BEHIND, _INVALID, _CULLED = (0.2, 0.75, 0.3), (0.95, 0.5, 0.05), (0.8, 0.08, 0.1), (0.25, 0.35, 0.65)
+_MARKS = {CULLED: (0.25, 0.25, 0.25), INVALID: (0.66, 0.15, 0.15)}  # spheres of probes that are not active
 
 
 def draw(context: bpy.types.Context, session: SceneSession, preview) -> None:
@@ -41,7 +34,7 @@ def draw(context: bpy.types.Context, session: SceneSession, preview) -> None:
     if preview.mode == "ERROR":
         _heat_legend(left, bottom + 5 * line, scale)
     elif preview.mode == "VALIDITY":
-        _legend(_STATES, left, bottom + 4 * line, line, scale)
+        _legend(_states(session), left, bottom + 4 * line, line, scale)
     elif preview.show_probes:
         _legend(_marks(session), left, bottom + 4 * line, line, scale)
 
@@ -110,14 +103,29 @@ def _heat_legend(left: float, bottom: float, scale: float) -> None:
     write(f"{HEAT_END_PERCENT} % and more", left + 0.75 * width, bottom - 1.5 * height, scale)
 
 
-def _marks(session: SceneSession) -> list[tuple[tuple[float, float, float], str]]:
-    """Colours of spheres of probes without light of their own, where there are such."""
-    fields = session.gpu.fields.values() if session.gpu else []
+def _states(session: SceneSession) -> list[tuple[tuple[float, float, float], str]]:
+    """Colours of surface by the probes around it, and what they mean."""
     return [
-        (color, meaning)
-        for state, color, meaning in _MARKS
-        if any((item.field.state == state).any() for item in fields)
+        (_FREE, "sees free space"),
+        (_BEHIND, "sees back faces"),
+        (_INVALID, f"invalid: {_why_invalid(session)}"),
+        (_CULLED, CULLED_MEANS),
     ]
+
+
+def _marks(session: SceneSession) -> list[tuple[tuple[float, float, float], str]]:
+    """Colours of spheres of probes that are not active, where there are such."""
+    means = {CULLED: f"probe is {CULLED_MEANS}", INVALID: f"probe is invalid: {_why_invalid(session)}"}
+    fields = _fields(session)
+    return [(_MARKS[state], means[state]) for state in means if any((field.state == state).any() for field in fields)]
+
+
+def _why_invalid(session: SceneSession) -> str:
+    return invalid_in_words(invalid_counts(_fields(session)))
+
+
+def _fields(session: SceneSession) -> list[Field]:
+    return [item.field for item in session.gpu.fields.values()] if session.gpu else []
 
 
 def _legend(

@@ -9,6 +9,7 @@ from gridlight.cli import bake as bake_command
 from gridlight.cli.progress import Reporter
 from gridlight.core.conventions import INVALID
 from gridlight.core.errors import InputError
+from gridlight.core.probe_states import invalid_counts
 from gridlight.farm import container
 from gridlight.farm import merge as merge_command
 from gridlight.farm.job import Job
@@ -159,7 +160,7 @@ def test_missing_shards_are_refused_or_marked_invalid(planned, farm_command, pla
     (tmp_path / "whole.exr").write_bytes(plain())
     whole = probe_file.read(tmp_path / "whole.exr")
     lost = field.state != whole.state
-    assert lost.sum() == 8 and (field.state[lost] == INVALID).all()
+    assert lost.sum() == 8 and (field.state[lost] == INVALID).all() and invalid_counts([field]) == {"not_baked": 8}
     np.testing.assert_array_equal(field.coefficients[~lost], whole.coefficients[~lost])
     assert (field.coefficients[lost, 0] > 0).all()  # dilated from its neighbours
     assert any("shard 2" in warning for warning in field.metadata["warnings"])

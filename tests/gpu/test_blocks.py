@@ -11,6 +11,7 @@ from gridlight.bake.block_session import open_session
 from gridlight.core.blocks import cut
 from gridlight.core.conventions import ACTIVE, INVALID
 from gridlight.core.grid import Grid
+from gridlight.core.probe_states import invalid_counts
 from gridlight.core.settings import BakeSettings
 from gridlight.core.snapshot import Light, Material
 from small_scenes import Silent, all_lights, bake, box, cluttered_room, frame, furnace, irradiance_at_nodes, snapshot_of
@@ -76,6 +77,7 @@ def test_light_in_another_block_tells_a_solid():
     inside = grid.positions()[:, 0] > 0.5
     np.testing.assert_array_equal(whole.field.state == INVALID, inside)
     np.testing.assert_array_equal(parts.field.state, whole.field.state)
+    assert invalid_counts([whole.field]) == invalid_counts([parts.field]) == {"in_solid": inside.sum()}
 
 
 def test_a_dark_scene_is_dark_in_all_blocks():
