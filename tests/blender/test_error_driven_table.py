@@ -8,6 +8,7 @@ The error is that of ``verify``'s first row: irradiance for six normals at activ
 import time
 
 import bpy
+import measured_rooms
 import numpy as np
 import pytest
 from gridlight.bake.bake_job import BakeJob
@@ -25,16 +26,11 @@ from gridlight.formats import probe_file
 from gridlight.scene.cycles_reference import render_panoramas
 from gridlight.scene.gallery import build_gallery
 from gridlight.scene.read import read_scene
-from gridlight.tests import scenes
 
 TARGETS = (0.10, 0.05, 0.03, 0.02)
 BY_HAND = ((6, 1), (8, 1), (12, 1), (16, 2), (24, 2), (32, 4))  # face, samples
 POINTS, HEIGHT, SAMPLES, SEEDS = 20, 64, 12, (1, 1_000_003)
 LEAST_MET, MOST_COST = 0.9, 3.0
-
-
-def in_cornell(**options):
-    return lambda: (scenes.cornell(**options), Grid.from_bounds((0.15,) * 3, (2.65,) * 3, (5, 5, 5)))
 
 
 def gallery():
@@ -44,60 +40,17 @@ def gallery():
     return scene, Grid(volume.matrix, volume.resolution)
 
 
-def two_rooms():
-    return scenes.lit_and_dark_rooms(0.1), Grid.from_bounds((0.15,) * 3, (4.95, 2.35, 2.35), (9, 5, 5))
-
-
-def window():
-    scene = scenes.new_scene("Window", (0.3, 0.4, 0.6))
-    plaster, t = scenes.diffuse((0.6, 0.55, 0.5)), 0.2
-    for name, low, high in (
-        ("Floor", (-t, -t, -t), (5 + t, 4 + t, 0)),
-        ("Ceiling", (-t, -t, 2.8), (5 + t, 4 + t, 2.8 + t)),
-        ("Back", (-t, 4, 0), (5 + t, 4 + t, 2.8)),
-        ("Left", (-t, 0, 0), (0, 4, 2.8)),
-        ("Right", (5, 0, 0), (5 + t, 4, 2.8)),
-        ("Front left", (-t, -t, 0), (1.5, 0, 2.8)),
-        ("Front right", (3.5, -t, 0), (5 + t, 0, 2.8)),
-        ("Sill", (1.5, -t, 0), (3.5, 0, 0.9)),
-        ("Lintel", (1.5, -t, 2.2), (3.5, 0, 2.8)),
-    ):
-        scenes.add_box(scene, name, low, high, plaster)
-    scenes.add_box(scene, "Table", (2, 1.5, 0), (3.2, 2.3, 0.75), scenes.diffuse((0.3, 0.2, 0.1)))
-    scenes.add_light(scene, "SUN", rotation=(-0.8, 0.2, 0), energy=3.0, angle=0.01)
-    return scene, Grid.from_bounds((0.3, 0.3, 0.3), (4.7, 3.7, 2.5), (5, 5, 4))
-
-
-def outdoors():
-    scene = scenes.new_scene("Outdoors", (0.4, 0.5, 0.7))
-    scenes.add_box(scene, "Ground", (-20, -20, -1), (20, 20, 0), scenes.diffuse((0.4, 0.35, 0.3)))
-    scenes.add_box(scene, "Red", (-2, -1, 0), (-0.5, 1, 2), scenes.diffuse((0.7, 0.2, 0.2)), 0.4)
-    scenes.add_box(scene, "Green", (1, -0.5, 0), (2, 1.5, 1), scenes.diffuse((0.2, 0.7, 0.2)), -0.3)
-    scenes.add_light(scene, "SUN", rotation=(0.6, 0.5, 0), energy=4.0, angle=0.01)
-    return scene, Grid.from_bounds((-3, -2.5, 0.4), (3, 2.5, 3), (5, 5, 4))
-
-
-def panel():
-    scene = scenes.new_scene("Panel")
-    colors = ((0.7, 0.7, 0.7), (0.7, 0.7, 0.7), (0.6, 0.3, 0.3), (0.3, 0.6, 0.3), (0.5, 0.5, 0.6), (0.7, 0.6, 0.5))
-    walls = [scenes.diffuse(color) for color in colors]
-    scenes.add_room_slabs(scene, (0, 0, 0), (4, 3, 2.6), 0.2, walls)
-    scenes.add_plane(scene, "Panel", (2, 1.5, 2.59), (0.4, 0, 0), (0, -0.3, 0), scenes.emitter((1, 0.9, 0.8), 12.0))
-    scenes.add_box(scene, "Box", (1, 1, 0), (1.8, 1.9, 0.8), walls[0], 0.5)
-    return scene, Grid.from_bounds((0.3, 0.3, 0.3), (3.7, 2.7, 2.3), (4, 4, 4))
-
-
 SCENES = {
     "gallery": gallery,
-    "Cornell, area light": in_cornell(),
-    "Cornell, spot": in_cornell(light="spot"),
-    "Cornell of planes, point": in_cornell(walls="planes", light="point"),
-    "Cornell of a cube, area light": in_cornell(walls="cube"),
-    "Cornell, glowing strip": in_cornell(light="strip"),
-    "lit and dark room": two_rooms,
-    "window, sun and sky": window,
-    "outdoors, sun and sky": outdoors,
-    "glowing panel": panel,
+    "Cornell, area light": measured_rooms.in_cornell(),
+    "Cornell, spot": measured_rooms.in_cornell(light="spot"),
+    "Cornell of planes, point": measured_rooms.in_cornell(walls="planes", light="point"),
+    "Cornell of a cube, area light": measured_rooms.in_cornell(walls="cube"),
+    "Cornell, glowing strip": measured_rooms.in_cornell(light="strip"),
+    "lit and dark room": measured_rooms.two_rooms,
+    "window, sun and sky": measured_rooms.window,
+    "outdoors, sun and sky": measured_rooms.outdoors,
+    "glowing panel": measured_rooms.panel,
 }
 
 
