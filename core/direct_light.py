@@ -47,11 +47,23 @@ def irradiance(
     light has no extent. Shadow rays start at ``origins`` (N, 3), the points stepped off their surface.
     """
     sample = sample_light(light, points, u)
+    unshadowed = unshadowed_irradiance(sample, normals)
+    lit = unshadowed.any(axis=1)
+    lit[lit] = arrives(light, sample, origins, lit, visible)
+    return np.where(lit[:, None], unshadowed, 0.0)
+
+
+def unshadowed_irradiance(sample: LightSamples, normals: np.ndarray) -> np.ndarray:
+    """(N, 3) irradiance by ``sample`` at surfaces with unit ``normals`` (N, 3) if nothing stands between."""
     cosine = np.einsum("ni,ni->n", sample.directions, normals)
-    lit = (cosine > 0) & sample.irradiance.any(axis=1)
-    if light.casts_shadow:
-        lit[lit] = visible(origins[lit], sample.directions[lit], sample.distances[lit] * _SHADOW_END)
-    return np.where(lit, cosine, 0.0)[:, None] * sample.irradiance
+    return np.maximum(cosine, 0.0)[:, None] * sample.irradiance
+
+
+def arrives(light: Light, sample: LightSamples, origins: np.ndarray, of: np.ndarray, visible: Visible) -> np.ndarray:
+    """Bool for those places ``of`` (N,) bool: does what ``sample`` of ``light`` sends get to ``origins`` (N, 3)?"""
+    if not light.casts_shadow:
+        return np.ones(np.count_nonzero(of), bool)
+    return visible(origins[of], sample.directions[of], sample.distances[of] * _SHADOW_END)
 
 
 def sample_light(light: Light, points: np.ndarray, u: np.ndarray) -> LightSamples:

@@ -30,7 +30,7 @@ from .grid import Grid
 POINTS = 16  # places of a patch where light is measured
 RAYS = 8  # that leave a patch for others, from its points in turn; a multiple of 4
 SAMPLES = (1, 4, 16, 64)  # of direct light, by the error that one would leave
-MOST_PARTS = 16  # in which direct light of lamps is kept
+MOST_PARTS = 16  # in which direct light of lamps is kept; and shadow rays of a place
 EMITTERS, ALL = "emitters", "all"
 Part = tuple[int, int] | str  # of the light: a range of the list of lamps and suns, EMITTERS, or ALL
 NO_PATCH, NOTHING = -1, -2  # in place of a patch: not bound; nothing to bind
@@ -83,12 +83,23 @@ def direct_samples(mean: np.ndarray, deviation: np.ndarray, light: np.ndarray, m
     return np.searchsorted(ERRORS, error / np.maximum(np.clip(light, DARK * mean_light, mean_light), 1e-30), "right")
 
 
+def lamps_a_ray(lamps: int) -> int:
+    """Neighbours in the list of ``lamps`` that share a shadow ray: none where there are MOST_PARTS or fewer."""
+    return max(-(-lamps // MOST_PARTS), 1)
+
+
 def light_parts(lamps: int, has_emitters: bool) -> list[Part]:
-    """What sends direct light that is kept apart: each of ``lamps``, neighbours together where there are more than
-    MOST_PARTS, and all sampled emitters."""
-    size = max(-(-lamps // MOST_PARTS), 1)
+    """What sends direct light that is kept apart: each of ``lamps``, or those that share a ray, and all sampled
+    emitters."""
+    size = lamps_a_ray(lamps)
     parts: list[Part] = [(first, min(first + size, lamps)) for first in range(0, lamps, size)]
     return [*parts, EMITTERS] if has_emitters else parts
+
+
+def spread_points(part: Part, lamps: int) -> int:
+    """At how many points of a patch it is looked how unevenly ``part`` of the light of ``lamps`` falls: at half of
+    them, or at fewer where many lamps would have to be asked at each."""
+    return max(POINTS // 2 // (1 if part == EMITTERS else lamps_a_ray(lamps)), 2)
 
 
 def coarser_by(round_: int) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 from .cubemap import direction_to_texel, texel_solid_angles
 from .emitters import CANDIDATES, PROBE_POINTS, PROBE_RAYS, reach
 from .reference_scene import ReferenceScene, Surfaces
-from .sampling import keys_of, sample_cosine, sample_r2, sample_r3, shifted
+from .sampling import WeightedChoice, keys_of, sample_cosine, sample_r2, sample_r3, shifted
 from .settings import BakeSettings
 from .snapshot import DIFFUSE_RAYS
 
@@ -125,22 +125,15 @@ class ReferenceEmitters:
     def _by_points(self, points, origins, normals, keys, index, role) -> np.ndarray:
         """Resampled: CANDIDATES points by power, one of them by what it would send if nothing stood between; a single
         number chooses among them one after the other."""
-        choice = sample_r3(shifted(keys, _CHOICE_STREAM, 0, 0), index)[:, 0].astype(float)
+        choice = WeightedChoice(sample_r3(shifted(keys, _CHOICE_STREAM, 0, 0), index)[:, 0])
         best = _Arrival(np.zeros_like(points), np.zeros_like(points), np.zeros(len(points), int))
-        best_weight, total = np.zeros(len(points)), np.zeros(len(points))
         for candidate in range(CANDIDATES):
             u = sample_r3(keys, np.asarray(index) * CANDIDATES + candidate).astype(float)
             arrival = self._arrival(self.sample(u), points, normals, role)
-            weight = arrival.irradiance.sum(axis=1)
-            total += weight
-            taken = (weight > 0) & (choice * total < weight)
-            left = ~taken & (total > weight)
-            choice[taken] *= total[taken] / weight[taken]
-            choice[left] = (choice[left] * total[left] - weight[left]) / (total[left] - weight[left])
-            best_weight[taken] = weight[taken]
+            taken = choice.takes(arrival.irradiance.sum(axis=1))
             for name in ("irradiance", "point", "group"):
                 getattr(best, name)[taken] = getattr(arrival, name)[taken]
-        lit = np.flatnonzero(best_weight > 0)
+        lit = np.flatnonzero(choice.weight > 0)
         # From where the ray starts, which is not the surface: to an emitter a few centimetres away it would be too long
         # and meet the emitter itself.
         way = best.point[lit] - origins[lit]
@@ -154,7 +147,7 @@ class ReferenceEmitters:
         result = np.zeros_like(points)
         way, length = way[visible], length[visible]
         tint = self.scene.tint(origins[lit], way / length[:, None], length * _SHADOW_END)
-        result[lit] = best.irradiance[lit] * (total[lit] / (best_weight[lit] * CANDIDATES))[:, None] * tint
+        result[lit] = best.irradiance[lit] * (choice.total[lit] / (choice.weight[lit] * CANDIDATES))[:, None] * tint
         return result
 
     def by_directions(self, origins: np.ndarray, normals: np.ndarray, keys: np.ndarray, index, role) -> np.ndarray:

@@ -11,12 +11,8 @@ packed normal.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import partial
-
 import numpy as np
 
-from . import direct_light
 from .conventions import LUMINANCE
 from .cubemap import direction_to_texel
 from .emitters import CANDIDATES, sampling_density
@@ -34,18 +30,20 @@ from .patches import (
     direct_samples,
     effort,
     light_parts,
+    spread_points,
     without_caught,
 )
 from .rays import leave_surface, step_off
 from .reference_emitters import ReferenceEmitters
 from .reference_gloss import ReferenceGloss, TexelReflections
+from .reference_lamps import ReferenceLamps
 from .reference_places import pack, split
 from .reference_scene import ReferenceScene
 from .reference_ways import PatchRays, Ways
-from .sampling import keys_of, light_keys, pcg3d, sample_cosine, sample_r2, shifted
+from .sampling import keys_of, pcg3d, sample_cosine, sample_r2, shifted
 from .settings import BakeSettings
 from .sheets import off_surface, side_weight
-from .snapshot import DIFFUSE_RAYS, Light
+from .snapshot import DIFFUSE_RAYS
 from .world_map import world_texels
 from .world_suns import extract_suns
 
@@ -64,10 +62,11 @@ class ReferenceLight:
         self.patches = Patches(grid)
         self.emitters = ReferenceEmitters(scene, sampling_density(scene.snapshot, grid))
         self.direct = np.zeros((0, 3))
-        rest, self._suns = extract_suns(scene.snapshot.world)
+        rest, suns = extract_suns(scene.snapshot.world)
+        self._lamps = ReferenceLamps(scene, suns)
         self._world = world_texels(rest, settings.face).reshape(-1, 3)
         self._effort = 1
-        self.gloss = ReferenceGloss(scene, self.emitters, self._all_lamps, self.background)
+        self.gloss = ReferenceGloss(scene, self.emitters, self._lamps.all, self.background)
 
     def background(self, directions: np.ndarray) -> np.ndarray:
         """(N, 3) radiance of the world along ``directions`` (N, 3), as rays see it."""
@@ -115,7 +114,7 @@ class ReferenceLight:
         if lit == 0:
             self._effort = effort(self.patches.count, self.settings.samples)
         numbers = np.arange(lit, self.patches.count)
-        parts = light_parts(len(self._all_lamps()), self.emitters.count > 0)
+        parts = light_parts(self._lamps.count, self.emitters.count > 0)
         sheets = self.patch_sheets
         spread = {part: self.spread(self.patches.points, numbers, part, sheets) for part in parts}
         light = sum((mean for mean, _deviation in spread.values()), np.zeros(len(numbers)))
@@ -132,19 +131,19 @@ class ReferenceLight:
     def spread(
         self, points: np.ndarray, numbers: np.ndarray, part: Part, sheets: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and standard deviation (C,) of the luminance of one sample's irradiance by ``part`` at every second
-        point of the patches ``numbers`` (C,) if nothing stands between.
+        """Mean and standard deviation (C,) of the luminance of one sample's irradiance by ``part`` at some of the
+        points of the patches ``numbers`` (C,) if nothing stands between.
 
         Points on emitters are random themselves, but a sample's candidates average that: two at each place tell the
         two variances apart.
         """
         keys = keys_of(numbers, 0, self.settings.seed)
-        count = points.shape[1] // 2
+        count = spread_points(part, self._lamps.count)
         luminance = np.zeros((count, len(numbers)))
         candidate_variance = np.zeros(len(numbers))
         roles = self._roles(numbers, sheets)
         for index in range(count):
-            point, normal = split(points[numbers, 2 * index])
+            point, normal = split(points[numbers, points.shape[1] // count * index])
             for side, normals, side_keys, share in self._sides(normal, keys, numbers, sheets):
                 weight, role = share @ LUMINANCE, roles[side]
                 if part == EMITTERS:
@@ -158,7 +157,7 @@ class ReferenceLight:
                     candidate_variance[side] += (one - other) ** 2 / 2 / count
                 else:
                     at = point[side]
-                    lamps = self._lamps(at, at, normals, side_keys, index, role, shadows=False, part=part)
+                    lamps = self._lamps.unshadowed(at, normals, side_keys, index, role, part)
                     luminance[index, side] += lamps @ LUMINANCE * weight
         variance = np.maximum(luminance.var(axis=0) - candidate_variance / 2, 0.0) + candidate_variance / CANDIDATES
         return luminance.mean(axis=0), np.sqrt(variance)
@@ -205,34 +204,13 @@ class ReferenceLight:
         """(C,) roles of the patches ``numbers`` (C,) in light linking."""
         return np.zeros(len(numbers), int) if sheets is None else self.scene.sheet_roles[sheets[numbers]]
 
-    def _all_lamps(self) -> list[Light]:
-        """Lamps and suns of the world."""
-        return [*self.scene.snapshot.lights, *self._suns]
-
     def _irradiance(self, point, origin, normal, lamp_keys, emitter_keys, index, role, part: Part = ALL) -> np.ndarray:
         irradiance = np.zeros_like(point)
         if part != EMITTERS:
-            irradiance += self._lamps(point, origin, normal, lamp_keys, index, role, part=part)
+            irradiance += self._lamps.irradiance(point, origin, normal, lamp_keys, index, role, part)
         if self.emitters.count and part in (EMITTERS, ALL):
             irradiance += self.emitters.irradiance(point, origin, normal, emitter_keys, index, role)
         return irradiance
-
-    def _lamps(self, point, origin, normal, keys, index, role, shadows: bool = True, part: Part = ALL) -> np.ndarray:
-        """(C, 3) irradiance of lamps and suns of the world by sample ``index`` of the sequences of ``keys`` (C, 3), on
-        surfaces of ``role`` (C,)."""
-        total = np.zeros_like(point)
-        first, stop = part if isinstance(part, tuple) else (0, None)
-        for number, light in list(enumerate(self._all_lamps()))[first:stop]:
-            u = sample_r2(light_keys(keys, number), index).astype(float)
-            light = light if shadows else replace(light, casts_shadow=False)
-            visible = partial(self.scene.visible, group=light.link_group)
-            place = point + self.scene.origin
-            light_there = direct_light.irradiance(light, place, origin, normal, u, visible)
-            if light.casts_shadow:
-                way = direct_light.sample_light(light, place, u)
-                light_there *= self.scene.tint(origin, way.directions, way.distances, group=light.link_group)
-            total += np.where(self.scene.falls_on(light.link_group, role)[:, None], light_there, 0.0)
-        return total
 
     # Rays
     # ------------------------------------------------------------------------------------------------------------------

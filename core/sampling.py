@@ -66,6 +66,27 @@ def shifted(keys: np.ndarray, *by: int) -> np.ndarray:
     return keys + np.array([number & 0xFFFFFFFF for number in by], np.uint32)
 
 
+class WeightedChoice:
+    """One of several things for each of N, in proportion to weights that come one after the other, by a single number
+    ``u`` (N,) in [0, 1): what is left of it is spread over 0..1 again each time."""
+
+    def __init__(self, u: np.ndarray):
+        self._number = u.astype(float)
+        self.total = np.zeros(len(u))  # of all weights
+        self.weight = np.zeros(len(u))  # of what is chosen
+
+    def takes(self, weight: np.ndarray) -> np.ndarray:
+        """(N,) bool: does the choice move on to the next thing, of ``weight`` (N,), not negative?"""
+        self.total += weight
+        number, total = self._number, self.total
+        taken = (weight > 0) & (number * total < weight)
+        left = ~taken & (total > weight)
+        number[taken] *= total[taken] / weight[taken]
+        number[left] = (number[left] * total[left] - weight[left]) / (total[left] - weight[left])
+        self.weight[taken] = weight[taken]
+        return taken
+
+
 def light_keys(keys: np.ndarray, light: int) -> np.ndarray:
     """Keys of the places on light number ``light``; the odd factor keeps lights apart for any seed."""
     return shifted(keys, 0, 0, light * 0x9E3779B9)

@@ -257,14 +257,20 @@ def texel_patches_comp(info, defines):
     return {"compute": ["data_lib", "texel_patches_comp"]}
 
 
+def _part_of_light(info) -> None:
+    """Which lamps direct_light_lib takes."""
+    info.define("FIRST_LIGHT", "first_light")
+    info.define("LAMPS_A_RAY", "lamps_a_ray")
+
+
 def patch_spread_comp(info, defines):
     slot = _scene(info, defines, attributes="HAS_EMITTERS" in defines)
     slot = _emitters(info, defines, slot)
     slot = _samplers(info, "lights", "patch_points", first=slot)
     _sheets(info, defines, slot, "sheet_numbers")
     _image(info, 0, "spread", pixel="RG32F")
-    _ints(info, "first_patch", "patch_count", "first_light", "light_count", "seed")
-    info.define("FIRST_LIGHT", "first_light")
+    _ints(info, "first_patch", "patch_count", "first_light", "light_count", "lamps_a_ray", "point_count", "seed")
+    _part_of_light(info)
     info.local_group_size(64, 1, 1)
     files = ["data_lib", "octahedral_lib", *_light_files(defines), *_sheet_files(defines), "patch_spread_comp"]
     return {"compute": files}
@@ -283,8 +289,8 @@ def patch_direct_comp(info, defines):
     _sheets(info, defines, slot, "sheet_numbers")
     _image(info, 0, "sums")
     _patch_lists(info)
-    _ints(info, "first_key", "first_light", "light_count", "seed")
-    info.define("FIRST_LIGHT", "first_light")
+    _ints(info, "first_key", "first_light", "light_count", "lamps_a_ray", "seed")
+    _part_of_light(info)
     info.local_group_size(64, 1, 1)
     files = ["data_lib", "octahedral_lib", *_light_files(defines), *_sheet_files(defines)]
     return {"compute": [*files, "patch_lists_lib", "patch_direct_comp"]}

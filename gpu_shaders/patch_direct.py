@@ -10,7 +10,7 @@ from __future__ import annotations
 import gpu
 import numpy as np
 
-from ..core.patches import ALL, EMITTERS, SAMPLES, Part, light_parts
+from ..core.patches import ALL, EMITTERS, SAMPLES, Part, lamps_a_ray, light_parts, spread_points
 from ..core.settings import BakeSettings
 from ..core.steps import Pace, Steps
 from .dispatch import COMPACTION_BLOCK, dispatch_linear
@@ -21,7 +21,7 @@ from .scene_textures import SceneTextures
 from .textures import read
 
 _SAMPLES_EACH = 2  # of one lamp, or of emitters, that a thread takes
-_LAMPS_AT_ONCE = 32  # that a thread takes
+_LAMPS_AT_ONCE = 32  # that a thread takes, where each gets a ray
 _SAMPLES_AT_ONCE = 1 << 20
 _MOST_LISTS, _MOST_TERMS = 4, 4  # that a shader takes
 _UNLIT = -1  # in place of an index into SAMPLES
@@ -97,6 +97,10 @@ class PatchDirect:
         yield from self._light_what_is_due(places)
         return lamps
 
+    @property
+    def _lamps_a_ray(self) -> int:
+        return lamps_a_ray(self._scene.lamp_count)
+
     def _wanted_parts(self) -> list[Part]:
         return light_parts(self._scene.lamp_count, self._scene.emitter_count > 0)
 
@@ -169,7 +173,12 @@ class PatchDirect:
         shader = program("patch_spread_comp", POINTS=places.each, **self._defines(part))
         self._bind(shader, part, places)
         shader.image("spread", spread)
-        for name, value in (("first_patch", first), ("patch_count", stop - first), ("seed", self._settings.seed)):
+        for name, value in (
+            ("first_patch", first),
+            ("patch_count", stop - first),
+            ("point_count", spread_points(part, self._scene.lamp_count)),
+            ("seed", self._settings.seed),
+        ):
             shader.uniform_int(name, (value,))
         dispatch_linear(shader, stop - first)
 
@@ -189,8 +198,8 @@ class PatchDirect:
         ``target``; in steps."""
         work = sum(count * samples for _first, count, samples in lists)
         for begins, portion in enumerate(self._portions(part)):
-            lamps = portion[1] - portion[0] if isinstance(portion, tuple) else 1
-            samples_each = max(1, _SAMPLES_EACH // lamps)
+            rays = -(-(portion[1] - portion[0]) // self._lamps_a_ray) if isinstance(portion, tuple) else 1
+            samples_each = max(1, _SAMPLES_EACH // rays)
 
             def light(start: int, number: int, portion=portion, samples_each=samples_each, begins=begins == 0) -> None:
                 some = _cut(lists, start, start + number)
@@ -203,7 +212,8 @@ class PatchDirect:
         if part == EMITTERS:
             return [EMITTERS]
         first, stop = part if isinstance(part, tuple) else (0, self._scene.lamp_count)
-        portions: list[Part] = [(at, min(at + _LAMPS_AT_ONCE, stop)) for at in range(first, stop, _LAMPS_AT_ONCE)]
+        at_once = max(_LAMPS_AT_ONCE // self._lamps_a_ray, 1) * self._lamps_a_ray
+        portions: list[Part] = [(at, min(at + at_once, stop)) for at in range(first, stop, at_once)]
         return [*portions, EMITTERS] if part == ALL and self._scene.emitter_count else portions
 
     def _light_portion(
@@ -245,6 +255,7 @@ class PatchDirect:
         first, stop = part if isinstance(part, tuple) else (0, 0)
         shader.uniform_int("first_light", (first,))
         shader.uniform_int("light_count", (stop,))
+        shader.uniform_int("lamps_a_ray", (self._lamps_a_ray,))
         shader.uniform_sampler("patch_points", places.points)
         self._scene.bind_sheets(shader, places.sheets)
 

@@ -16,6 +16,9 @@ const float LEAST_PROFILE_DISTANCE = 0.25; /* metres; each is four times the one
 #ifndef FIRST_LIGHT
 #define FIRST_LIGHT 0
 #endif
+#ifndef LAMPS_A_RAY
+#define LAMPS_A_RAY max((light_count + 15) / 16, 1) /* core/patches.py: lamps_a_ray */
+#endif
 
 const int POINT = 0, SPOT = 1, SUN = 2, RECTANGLE = 3, ELLIPSE = 4;
 
@@ -156,33 +159,74 @@ int group_of_light(int light)
 }
 #endif
 
+/* What a sample of a light sends to a surface if nothing stands between. */
+vec3 unshadowed_irradiance(int light, LightSample light_sample, vec3 normal)
+{
+#ifdef HAS_LINKS
+  if (!falls_on(group_of_light(light), lit_role)) {
+    return vec3(0.0);
+  }
+#endif
+  return light_sample.irradiance * max(dot(light_sample.direction, normal), 0.0);
+}
+
+/* The share of it that arrives, by a shadow ray. */
+vec3 light_arriving(int light, LightSample light_sample, vec3 origin)
+{
+  int group = 0;
+#ifdef HAS_LINKS
+  group = group_of_light(light);
+#endif
+  bool shadow = (int(element(lights, 6 * light + 4).w) & 1) != 0;
+  return shadow ? light_along(origin, light_sample.direction, light_sample.distance * 0.9999, group) : vec3(1.0);
+}
+
 /* Irradiance of one light at a surface: one shadow ray to the place on the light that `u` picks. */
 vec3 light_irradiance(int light, vec3 point, vec3 origin, vec3 normal, vec2 u)
 {
   LightSample light_sample = sample_light(light, point, u);
-  float cosine = dot(light_sample.direction, normal);
-  if (cosine <= 0.0 || light_sample.irradiance == vec3(0.0)) {
-    return vec3(0.0);
-  }
-  int group = 0;
-#ifdef HAS_LINKS
-  group = group_of_light(light);
-  if (!falls_on(group, lit_role)) {
-    return vec3(0.0);
-  }
-#endif
-  bool shadow = (int(element(lights, 6 * light + 4).w) & 1) != 0;
-  vec3 arriving = shadow ? light_along(origin, light_sample.direction, light_sample.distance * 0.9999, group) : vec3(1.0);
-  return light_sample.irradiance * cosine * arriving;
+  vec3 irradiance = unshadowed_irradiance(light, light_sample, normal);
+  return irradiance == vec3(0.0) ? irradiance : irradiance * light_arriving(light, light_sample, origin);
 }
 
-/* Irradiance of all lamps: sample `index` of the sequences of `key`. */
+/* For lights `first` .. `stop`: the place on each of them, and which one is chosen. */
+vec3 numbers_of_lights(int first, int stop, uvec3 key, int index)
+{
+  uvec3 own_key = key + uvec3(0u, 0u, uint(first) * 0x9E3779B9u);
+  return stop - first > 1 ? sample_r3(own_key, index) : vec3(sample_r2(own_key, index), 0.0);
+}
+
+/* Irradiance of lights `first` .. `stop`: one shadow ray to one of them, chosen by what each sends if nothing stands between (Talbot, Cline and
+ * Egbert, "Importance Resampling for Global Illumination", EGSR 2005, with every light a candidate). */
+vec3 lights_irradiance(int first, int stop, vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
+{
+  vec3 numbers = numbers_of_lights(first, stop, key, index);
+  float choice = numbers.z;
+  LightSample best_sample;
+  vec3 best_irradiance = vec3(0.0);
+  int best = -1;
+  float best_weight = 0.0, total = 0.0;
+  for (int light = first; light < stop; light++) {
+    LightSample light_sample = sample_light(light, point, numbers.xy);
+    vec3 irradiance = unshadowed_irradiance(light, light_sample, normal);
+    float weight = abs(irradiance.r) + abs(irradiance.g) + abs(irradiance.b);
+    if (takes(weight, choice, total)) {
+      best_sample = light_sample;
+      best_irradiance = irradiance;
+      best_weight = weight;
+      best = light;
+    }
+  }
+  return best < 0 ? vec3(0.0) : best_irradiance * (total / best_weight) * light_arriving(best, best_sample, origin);
+}
+
+/* Irradiance of all lamps: sample `index` of the sequences of `key`. LAMPS_A_RAY neighbours share a shadow ray. */
 vec3 lamps_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
 {
+  int lamps_each = LAMPS_A_RAY;
   vec3 sum = vec3(0.0);
-  for (int light = FIRST_LIGHT; light < light_count; light++) {
-    vec2 u = sample_r2(key + uvec3(0u, 0u, uint(light) * 0x9E3779B9u), index);
-    sum += light_irradiance(light, point, origin, normal, u);
+  for (int first = FIRST_LIGHT; first < light_count; first += lamps_each) {
+    sum += lights_irradiance(first, min(first + lamps_each, light_count), point, origin, normal, key, index);
   }
   return sum;
 }
@@ -190,15 +234,14 @@ vec3 lamps_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index
 /* The same if nothing stood between. */
 vec3 lamps_unshadowed(vec3 point, vec3 normal, uvec3 key, int index)
 {
+  int lamps_each = LAMPS_A_RAY;
   vec3 sum = vec3(0.0);
-  for (int light = FIRST_LIGHT; light < light_count; light++) {
-#ifdef HAS_LINKS
-    if (!falls_on(group_of_light(light), lit_role)) {
-      continue;
+  for (int first = FIRST_LIGHT; first < light_count; first += lamps_each) {
+    int stop = min(first + lamps_each, light_count);
+    vec2 u = numbers_of_lights(first, stop, key, index).xy;
+    for (int light = first; light < stop; light++) {
+      sum += unshadowed_irradiance(light, sample_light(light, point, u), normal);
     }
-#endif
-    LightSample light_sample = sample_light(light, point, sample_r2(key + uvec3(0u, 0u, uint(light) * 0x9E3779B9u), index));
-    sum += light_sample.irradiance * max(dot(light_sample.direction, normal), 0.0);
   }
   return sum;
 }

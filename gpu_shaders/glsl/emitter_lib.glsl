@@ -108,17 +108,11 @@ vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, 
     vec3 irradiance = emitter.radiance * (surface_cosine * emitter_cosine / (squared * emitter.density) *
                                           point_share(emitter.group, emitter.density, distance, surface_cosine, emitter_cosine));
     float weight = irradiance.r + irradiance.g + irradiance.b;
-    total += weight;
-    /* one number chooses among all candidates: what is left of it is spread over 0..1 again */
-    if (weight > 0.0 && choice * total < weight) {
-      choice = choice * total / weight;
+    if (takes(weight, choice, total)) {
       best_irradiance = irradiance;
       best_point = emitter.point;
       best_group = emitter.group;
       best_weight = weight;
-    }
-    else if (total > weight) {
-      choice = (choice * total - weight) / (total - weight);
     }
   }
   if (best_weight == 0.0) {

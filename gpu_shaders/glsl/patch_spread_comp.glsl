@@ -1,7 +1,7 @@
 /* How unevenly lamps and sampled emitters light the points of each patch if nothing stands between: what decides how many of them get
  * shadow rays.
  *
- * Every second point tells it well enough. Points on emitters are random themselves, but a sample's candidates average that (emitter_lib.glsl): two at each place tell the two
+ * Some points tell it well enough (core/patches.py: spread_points). Points on emitters are random themselves, but a sample's candidates average that (emitter_lib.glsl): two at each place tell the two
  * variances apart.
  * Dispatch: one thread a patch from first_patch on; groups of 64. Writes mean and standard deviation of the luminance of one sample's
  * irradiance.
@@ -18,7 +18,7 @@ float luminance_of_side(vec3 point, vec3 normal, uvec3 key, int index, float sha
   float other = share * dot(emitter_unshadowed(point, normal, key, 2 * index + 1), LUMINANCE);
   luminance += 0.5 * (one + other);
   luminance += share * dot(emitter_direction_irradiance(leave_surface(point, normal), normal, key, index), LUMINANCE);
-  variance += 0.5 * (one - other) * (one - other) / float(POINTS / 2);
+  variance += 0.5 * (one - other) * (one - other) / float(point_count);
 #endif
   return luminance;
 }
@@ -35,9 +35,8 @@ void main()
   lit_role = role_of_sheet(int(element(sheet_numbers, patch_index).x));
 #endif
   float sum = 0.0, squares = 0.0, candidate_variance = 0.0;
-  const int count = POINTS / 2;
-  for (int i = 0; i < count; i++) {
-    vec4 at = element(patch_points, POINTS * patch_index + 2 * i);
+  for (int i = 0; i < point_count; i++) {
+    vec4 at = element(patch_points, POINTS * patch_index + POINTS / point_count * i);
     vec3 normal = unpack_normal(at.w);
 #ifdef HAS_SHEETS
     float through = dot(share_of_back(int(element(sheet_numbers, patch_index).x)), LUMINANCE);
@@ -51,8 +50,8 @@ void main()
     sum += luminance;
     squares += luminance * luminance;
   }
-  float mean = sum / float(count);
-  float variance = max(squares / float(count) - mean * mean - 0.5 * candidate_variance, 0.0);
+  float mean = sum / float(point_count);
+  float variance = max(squares / float(point_count) - mean * mean - 0.5 * candidate_variance, 0.0);
 #ifdef HAS_EMITTERS
   variance += candidate_variance / float(CANDIDATES);
 #endif

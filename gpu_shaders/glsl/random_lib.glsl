@@ -31,6 +31,21 @@ vec3 sample_r3(uvec3 key, int index)
   return vec3(place >> 8u) * (1.0 / 16777216.0);
 }
 
+/* One of several in proportion to weights that come one after the other: does the choice move on to this one? A single `number` chooses, what
+ * is left of it is spread over 0..1 again; `total`: of the weights so far. */
+bool takes(float weight, inout float number, inout float total)
+{
+  total += weight;
+  if (weight > 0.0 && number * total < weight) {
+    number = number * total / weight;
+    return true;
+  }
+  if (total > weight) {
+    number = (number * total - weight) / (total - weight);
+  }
+  return false;
+}
+
 vec2 sample_disk(vec2 u)
 {
   float r = sqrt(u.x), phi = 6.283185307179586 * u.y;

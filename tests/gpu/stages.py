@@ -10,6 +10,7 @@ from gridlight.core.conventions import INVALID
 from gridlight.core.cubemap import octahedral_decode
 from gridlight.core.field import Field
 from gridlight.core.orientation import inside_solid
+from gridlight.core.patches import ALL
 from gridlight.core.reference_bake import ReferenceBake
 from gridlight.core.reference_scene import Surfaces
 from gridlight.gpu_shaders.backend import GpuBackend
@@ -149,12 +150,12 @@ class Stages:
         self.light._direct.find_spread(part, self.light.patches.places, 0, self.light.count, result)
         return read(result, self.light.count, channels=2).T
 
-    def direct_of(self, patches, samples):
-        """(C, 3) direct light of ``patches`` (C,) by so many samples."""
+    def direct_of(self, patches, samples, part=ALL):
+        """(C, 3) direct light of ``patches`` (C,) by so many samples of ``part``."""
         direct = allocate(self.light.count, "test")
         chosen = numbers(patches, "test")
         lists = [(0, len(patches), samples)]
-        steps.run(self.light._direct.light(self.light.patches.places, chosen, lists, direct))
+        steps.run(self.light._direct.light(self.light.patches.places, chosen, lists, direct, part=part))
         return read(direct, self.light.count)[patches, :3].astype(float)
 
     def direct(self):

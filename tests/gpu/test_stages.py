@@ -14,6 +14,7 @@ from gridlight.core.conventions import LUMINANCE
 from gridlight.core.grid import Grid
 from gridlight.core.orientation import ShellVote
 from gridlight.core.patches import (
+    ALL,
     NO_PATCH,
     NOTHING,
     SAMPLES,
@@ -158,6 +159,25 @@ def test_direct_light_of_each_lamp(stages, name):
         # the rest: shadow rays that graze an edge or a hole, and samples on the edge of a cone
         assert close(found, expected).mean() >= 0.985
         assert found.sum() == pytest.approx(expected.sum(), rel=5e-3)
+
+
+def test_direct_light_of_many_lamps(stages):
+    """More than rays: kept apart in parts, and all at once."""
+    generator = np.random.default_rng(0)
+    kinds = [light for name, light in all_lights().items() if "sun" not in name]
+    many = []
+    for number in generator.permutation(70):
+        matrix = np.array(kinds[number % len(kinds)].matrix, float)
+        matrix[:2, 3] += generator.uniform(-0.4, 0.4, 2)
+        many.append(replace(kinds[number % len(kinds)], name=f"lamp {number}", matrix=matrix))
+    stages.use_lights([*many, replace(many[0], color=(-2.0, -1.0, -3.0))])
+    patches = np.arange(0, stages.light.count, 37)
+    for part in (ALL, *light_parts(71, has_emitters=False)[-2:]):
+        found = stages.direct_of(patches, 3, part=part)
+        expected = stages.reference.light.direct_light(stages.points, patches, 3, part=part)
+        assert expected.any()
+        assert close(found, expected).mean() >= 0.97
+        assert found.sum() == pytest.approx(expected.sum(), rel=1e-2)
 
 
 def test_direct_light_as_the_bake_takes_it(lit):
