@@ -32,7 +32,7 @@ _UNSEEN = 1e-6  # weight of patches that no probe sees where iterations are comp
 
 
 @dataclass(frozen=True)
-class _Rays:
+class Rays:
     """Rays to trace: ``each`` of every one of ``count`` patches or texels of ``places`` from number ``first`` on.
 
     What they ``reflected`` (an element a ray) and what light they ``brought`` (an element a patch or texel) is written
@@ -163,16 +163,16 @@ class PatchLight:
         """(rays,) bool: does light come back?"""
         return read(self._reflected.texture, self.count * self._rays_each)[:, :3].any(axis=1)
 
-    def _trace_patches(self, start: int, stop: int) -> Iterator[tuple[_Rays, Places]]:
+    def _trace_patches(self, start: int, stop: int) -> Iterator[tuple[Rays, Places]]:
         """The rays of patches ``start`` .. ``stop``, part by part, and where they end."""
         at_once = max(1, _RAYS_AT_ONCE // self._rays_each)
         reflected, brought = self._reflected.reserve(stop * self._rays_each), self._brought.reserve(stop)
         for first in range(start, stop, at_once):
             count = min(stop - first, at_once)
-            rays = _Rays(self.patches.places, first, count, self._rays_each, reflected, brought)
+            rays = Rays(self.patches.places, first, count, self._rays_each, reflected, brought)
             yield rays, self._trace(rays)
 
-    def _trace(self, rays: _Rays) -> Places:
+    def _trace(self, rays: Rays) -> Places:
         """Where ``rays`` end, an element each, see patch_rays_comp.glsl."""
         hits, carried = (scratch(rays.total, "rays") for _ in range(2))
         sheets = scratch(rays.total, "rays", "R32F") if self._scene.has_sheets else None
@@ -200,7 +200,7 @@ class PatchLight:
         dispatch_linear(shader, rays.count)
         return Places(hits, 1, sheets)
 
-    def _bind_ray_scene(self, rays: _Rays):
+    def _bind_ray_scene(self, rays: Rays):
         """The shader that traces ``rays``, with what it reads of the scene bound: lamps only where rays are lit."""
         scene, is_path = self._scene, rays.segments > 1
         defines = scene.surface_defines | scene.sheet_defines | scene.gloss_defines
@@ -317,7 +317,7 @@ class PatchLight:
         chosen = numbers(reflects, "texels")
         run(self._direct.light(texels, chosen, [(0, len(reflects), settings.samples)], direct, first_key))
         reflected, brought = scratch(count * rays_each, "rays"), scratch(count, "texels")
-        rays = _Rays(texels, 0, count, rays_each, reflected, brought, settings.gather, first_key)
+        rays = Rays(texels, 0, count, rays_each, reflected, brought, settings.gather, first_key)
         ends = self.patches.bind_ends(self._trace(rays), rays.total, MOST_ROUNDS - 1)
         self._bounce(_Receivers(count, direct, brought, ends, reflected, rays_each), self._irradiance[0], result)
         return result

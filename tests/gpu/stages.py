@@ -14,6 +14,7 @@ from gridlight.core.patches import ALL
 from gridlight.core.reference_bake import ReferenceBake
 from gridlight.core.reference_scene import Surfaces
 from gridlight.gpu_shaders.backend import GpuBackend
+from gridlight.gpu_shaders.patch_light import Rays
 from gridlight.gpu_shaders.places import Places
 from gridlight.gpu_shaders.textures import allocate, numbers, read, upload
 from shader_runner import read_layers, run
@@ -168,9 +169,9 @@ class Stages:
         stop = first + count
         reflected, brought = allocate(stop * rays_each, "test"), allocate(stop, "test")
         places = self.light.patches.places
-        found = self.light._trace(places, first, count, rays_each, reflected, brought, segments)
+        hits = self.light._trace(Rays(places, first, count, rays_each, reflected, brought, segments))
         return (
-            read(found.hits.points, count * rays_each).reshape(count, rays_each, 4),
+            read(hits.points, count * rays_each).reshape(count, rays_each, 4),
             read(brought, stop)[first:, :3],
             read(reflected, stop * rays_each)[first * rays_each :, :3].reshape(count, rays_each, 3),
         )
