@@ -38,7 +38,6 @@ from .stopwatch import Stopwatch
 _CHECKED = 64  # probes from which paths are followed
 _BETWEEN = 32  # places between probes
 _FIRST_PATHS, _MOST_PATHS = 64, 1024  # of each place and set
-_MOST_CHECK = 2.0  # of the cost of all bakes: what paths may cost
 _BLURRED = 0.3  # of the standard error: less is not the paths' doing, but the spread between probes
 _SURE = 1.0  # standard errors by which a bake has to be below its target
 _LOST = 2.0  # standard errors by which it is held to be above: few paths carry most light and may come too early
@@ -47,7 +46,8 @@ _NEAR_FLOOR = 0.6  # where the bands alone miss the target, the rest is brought 
 _GIVEN_UP = 0.25  # of the squared error that is left when the target is met: upper bands that may go
 _TAIL = 0.2  # of the target: light that may be missing when iterations stop
 _MOST_PASSES = 6
-_MOST_COST, _MOST_IN_VAIN = 4.0, 2.0  # in first bakes: what all may cost, and where bands alone miss the target
+_MOST_CHECK = 2.0  # in first bakes: what paths may cost
+_MOST_COST, _MOST_IN_VAIN = 4.0, 2.0  # in first bakes: what all may cost, and where bands leave settings no room
 _MOST_STEP = 3.0  # times what was spent so far: what one more may cost
 _SEED_STEP = 7919  # between passes
 _BEHIND = 0.25  # of back faces in sight: more, and a place is inside something
@@ -179,11 +179,14 @@ class ErrorDrivenBake:
 
     def _next(self, wanted: float) -> Level | None:
         """The level to go to, by what the model knows."""
-        probes = len(self._active)
-        first = first_level(self.goal, self._settings.face, self._settings.samples).cost(probes)
-        all_of_it = (_MOST_COST if self._floor() < self.goal.target**2 else _MOST_IN_VAIN) * first
+        room = max(1.0 - self._floor() / self.goal.target**2, 0.0)  # all that settings can be better by
+        all_of_it = (_MOST_IN_VAIN + (_MOST_COST - _MOST_IN_VAIN) * room) * self._cost_of_first()
         most = min(all_of_it - self._spent, _MOST_STEP * self._spent)
-        return next_level(self._model, self._level, wanted, self.goal.kept, probes, most)
+        return next_level(self._model, self._level, wanted, self.goal.kept, len(self._active), most)
+
+    def _cost_of_first(self) -> float:
+        level = first_level(self.goal, self._settings.face, self._settings.samples)
+        return level.cost(len(self._active))
 
     def _error(self, field: Field | None = None) -> SquaredError:
         """Of what the probes of ``field`` hold, by default of all that was baked."""
@@ -208,7 +211,7 @@ class ErrorDrivenBake:
     def _too_dear(self) -> bool:
         """Whether twice the paths would be too many."""
         too_many = 2 * self._check.paths > _MOST_PATHS
-        return too_many or cost_of_paths(2 * self._paths.count) > _MOST_CHECK * self._spent
+        return too_many or cost_of_paths(2 * self._paths.count) > _MOST_CHECK * self._cost_of_first()
 
     def _finer_is_cheaper(self) -> bool:
         """Than to double the paths."""
