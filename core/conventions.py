@@ -39,6 +39,9 @@ CULLED, ACTIVE, INVALID = 0, 1, 2
 
 # Edge of the octahedral map of depth statistics that every probe carries for its visibility weights.
 DEPTH_EDGE = 8
+# Of a texel of that map, along an edge, what its 16 directions are spread over: the wider, the less a probe knows of
+# where a wall ends.
+DEPTH_SPREAD = 0.6
 
 # Cosine lobe, per band: irradiance = Σ A_l L_lm Y_lm(n). Ramamoorthi and Hanrahan, "An Efficient Representation for
 # Irradiance Environment Maps", SIGGRAPH 2001, eq. 8. The fourth band's factor is exactly zero.

@@ -26,7 +26,7 @@ LEAST_WEIGHT = 1e-24  # of an active probe that does not see the point: decides 
 INVALID_WEIGHT = 1e-27  # of probes inside solids, which carry their neighbours' light
 ON_BORDER = 1e-4  # of a cell: what is as near to a border lies on it, or rounding would choose between unseen and seen
 BEYOND = 0.5  # cells past the box that gradients lead on
-_SHARPNESS = 32  # power of the chance: the eighth lets through twice as much at walls, in open space both err alike
+_SHARPNESS = 12  # power of the chance
 LEAST_DISTANCE = 1e-6  # of the depth clamp: what a surface at no distance counts as
 _POINTS_AT_ONCE = 1 << 13
 _CORNERS = np.array([[corner & 1, corner >> 1 & 1, corner >> 2] for corner in range(8)])
@@ -38,9 +38,9 @@ def depth_clamp(grid: Grid) -> float:
 
 
 def visibility_bias(grid: Grid) -> float:
-    """Metres that a surface point is moved along its normal before it is tested, so that its own surface does not hide
-    it."""
-    return 0.1 * float(grid.cell_size().min())
+    """Metres that a point is moved along its normal before it is tested, so that its own surface does not hide it. As
+    far it may look through a wall that it faces, where it is not on a surface."""
+    return 0.08 * float(grid.cell_size().min())
 
 
 def least_deviation(grid: Grid) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 
 from . import culling, dilation, gradients, lookup
 from . import spherical_harmonics as sh
-from .conventions import ACTIVE, CULLED, DEPTH_EDGE, INVALID
+from .conventions import ACTIVE, CULLED, DEPTH_EDGE, DEPTH_SPREAD, INVALID
 from .cubemap import (
     direction_to_texel,
     octahedral_decode,
@@ -158,18 +158,13 @@ class ReferenceBake:
         return np.stack([seen @ self.solid_angles for seen in (solid, background, lit, back)], axis=1) / (4 * np.pi)
 
     def depth_moments(self, surfaces: Surfaces) -> np.ndarray:
-        """(P, DEPTH_EDGE², 2) mean and mean square of clamped distance, 16 directions over one and a half texels
-        each."""
-        step = (np.arange(4) - 1.5) * 0.375
+        """(P, DEPTH_EDGE², 2) mean and mean square of clamped distance, 16 directions a texel."""
+        step = (np.arange(4) - 1.5) * (DEPTH_SPREAD / 4)
         column, row = np.meshgrid(np.arange(DEPTH_EDGE), np.arange(DEPTH_EDGE))
         place = np.stack(
             np.broadcast_arrays(column[..., None, None] + 0.5 + step, row[..., None, None] + 0.5 + step[:, None]), -1
         )
         uv = place.reshape(DEPTH_EDGE**2, 16, 2) * (2.0 / DEPTH_EDGE) - 1.0
-        for axis in (0, 1):  # past the edge of the map the sphere goes on where the edge is mirrored to
-            past = np.abs(uv[..., axis]) > 1
-            uv[..., 1 - axis] = np.where(past, -uv[..., 1 - axis], uv[..., 1 - axis])
-            uv[..., axis] = np.where(past, np.sign(uv[..., axis]) * 2 - uv[..., axis], uv[..., axis])
         face, row, column = direction_to_texel(octahedral_decode(uv), self.settings.face)
         texel = (face * self.settings.face + row) * self.settings.face + column
         distance = np.minimum(surfaces.distance[:, texel], lookup.depth_clamp(self.grid))

@@ -7,7 +7,7 @@ make up which stage, libraries first.
 
 from __future__ import annotations
 
-from ..core.conventions import DEPTH_EDGE
+from ..core.conventions import DEPTH_EDGE, DEPTH_SPREAD
 from ..core.emitters import CANDIDATES, EMITTER_BOXES
 from ..core.gradients import LEAST_COSINE
 from ..core.images import HALF_MAX
@@ -164,6 +164,7 @@ def probe_exits_comp(info, defines):
 def probe_statistics_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
     info.define("DEPTH_EDGE", str(DEPTH_EDGE))
+    info.define("DEPTH_SPREAD", repr(DEPTH_SPREAD))
     slot = _samplers(info, "texel_weights", "shells", "patch_irradiance", "triangle_attributes")
     slot = _mirrored(info, defines, slot)
     _samplers(info, "geometry", "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)

@@ -1,7 +1,7 @@
 /* What each probe sees as a whole: the depth statistics of its lookup and how much of it is back faces, background and lit.
  *
- * Dispatch: one group of 64 threads a probe; thread t makes texel t of the octahedral map from 16 directions spread over one and a
- * half texels, so that neighbouring texels overlap and the map has no seams.
+ * Dispatch: one group of 64 threads a probe; thread t makes texel t of the octahedral map from 16 directions spread over DEPTH_SPREAD
+ * of it.
  * Back faces of `shells` do not count (core/orientation.py).
  * Writes depth_moments (mean, mean square of the clamped distance) and probe_shares, shares of the sphere: back faces of
  * solids, background, anything that sends light, all back faces.
@@ -19,16 +19,8 @@ void main()
   vec2 texel = vec2(lane % DEPTH_EDGE, lane / DEPTH_EDGE);
   vec2 moments = vec2(0.0);
   for (int i = 0; i < 16; i++) {
-    vec2 place = texel + 0.5 + (vec2(i & 3, i >> 2) - 1.5) * 0.375;
-    vec2 uv = place * (2.0 / float(DEPTH_EDGE)) - 1.0;
-    /* past the edge of the map the sphere goes on where the edge is mirrored to */
-    if (abs(uv.x) > 1.0) {
-      uv = vec2(sign(uv.x) * 2.0 - uv.x, -uv.y);
-    }
-    if (abs(uv.y) > 1.0) {
-      uv = vec2(-uv.x, sign(uv.y) * 2.0 - uv.y);
-    }
-    vec3 direction = octahedral_decode(uv);
+    vec2 place = texel + 0.5 + (vec2(i & 3, i >> 2) - 1.5) * (DEPTH_SPREAD / 4.0);
+    vec3 direction = octahedral_decode(place * (2.0 / float(DEPTH_EDGE)) - 1.0);
     float range = abs(texelFetch(geometry, ivec3(direction_texel(direction), layer), 0).z);
     range = min(range, depth_clamp);
     moments += vec2(range, range * range);

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 from gridlight.core import lookup
-from gridlight.core.conventions import CULLED, DEPTH_EDGE, INVALID
+from gridlight.core.conventions import CULLED, DEPTH_EDGE, DEPTH_SPREAD, INVALID
 from gridlight.core.cubemap import octahedral_decode
 from gridlight.core.field import Field
 from gridlight.core.grid import Grid
@@ -162,14 +162,10 @@ def test_the_depth_map_has_no_seams():
 
 
 def blurred_depth_of(distance_along, clamp):
-    """(DEPTH_EDGE², 2) moments as a bake stores them: over one and a half texels (probe_statistics_comp.glsl)."""
+    """(DEPTH_EDGE², 2) moments as a bake stores them: each over a part of its texel (probe_statistics_comp.glsl)."""
     texels = np.stack(np.meshgrid(np.arange(DEPTH_EDGE), np.arange(DEPTH_EDGE)), axis=-1).reshape(-1, 1, 2)
-    steps = (np.stack(np.meshgrid(np.arange(4), np.arange(4)), axis=-1).reshape(1, -1, 2) - 1.5) * 0.375
+    steps = (np.stack(np.meshgrid(np.arange(4), np.arange(4)), axis=-1).reshape(1, -1, 2) - 1.5) * (DEPTH_SPREAD / 4)
     uv = (texels + 0.5 + steps) * (2 / DEPTH_EDGE) - 1
-    for axis in (0, 1):  # past the edge the sphere goes on where the edge is mirrored to
-        past = np.abs(uv[..., axis]) > 1
-        uv[..., axis] = np.where(past, np.sign(uv[..., axis]) * 2 - uv[..., axis], uv[..., axis])
-        uv[..., 1 - axis] = np.where(past, -uv[..., 1 - axis], uv[..., 1 - axis])
     distance = np.minimum(distance_along(octahedral_decode(uv.reshape(-1, 2))), clamp).reshape(len(texels), -1)
     return np.stack([distance.mean(axis=1), (distance**2).mean(axis=1)], axis=1)
 
@@ -193,4 +189,4 @@ def test_a_wall_seen_at_a_slant_hides_what_is_behind_it(apart):
     assert lookup.visibility(field, nodes, behind).mean() < 0.1
     before = probe + np.column_stack([np.full(2000, 0.5 * apart), along])
     # A probe at 5 cm cannot tell what is half way to the wall and far along it: others take its part.
-    assert lookup.visibility(field, nodes, before).mean() > 0.45
+    assert lookup.visibility(field, nodes, before).mean() > (0.15 if apart < 0.1 else 0.9)
