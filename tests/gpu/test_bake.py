@@ -67,6 +67,7 @@ def test_furnace_with_other_faces(face):
     np.testing.assert_allclose(irradiance_at_nodes(result.field, NORMALS) * 0.1, 1, atol=2e-2 if face < 8 else 5e-3)
 
 
+@pytest.mark.any_version
 def test_a_furnace_that_loses_nothing_never_settles():
     result = bake(furnace(1.0), room_grid((2, 2, 2)), BakeSettings(face=4))
     assert not result.converged
@@ -273,6 +274,7 @@ def lamps_of_three_kinds():
     return cluttered_room({name: all_lights()[name] for name in ("point soft", "sun wide", "ellipse")}, clutter=12)
 
 
+@pytest.mark.any_version
 def test_another_seed_gives_other_bytes_but_the_same_light():
     grid = Grid.from_bounds([-0.6, -0.5, -0.5], [0.7, 0.5, 0.4], (3, 3, 3))
     one, two = (bake(lamps_of_three_kinds(), grid, BakeSettings(seed=seed)).field for seed in (0, 1))
@@ -284,6 +286,7 @@ def test_another_seed_gives_other_bytes_but_the_same_light():
 # ---------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.any_version
 def test_far_from_the_origin():
     """The same room 100 km away in every direction, and as far as 1000 km, where float64 still has 1e-10 m."""
     grid = Grid.from_bounds([-0.9] * 3, [0.9] * 3, (4, 4, 4))
@@ -296,6 +299,7 @@ def test_far_from_the_origin():
         assert relative_rms(found, expected) < 5e-3
 
 
+@pytest.mark.any_version
 @pytest.mark.parametrize("scale", [0.01, 1000.0])
 @pytest.mark.parametrize("capture", ["trace", "raster"])
 def test_scale(scale, capture):
@@ -311,6 +315,7 @@ def test_scale(scale, capture):
     assert relative_rms(irradiance_at_nodes(result.field), expected) < 5e-3
 
 
+@pytest.mark.any_version
 def test_a_rotated_volume_is_a_rotated_scene():
     """Cubemaps and depth maps stay aligned with the world: what is left is their different sampling of the scene."""
     rotation, _ = np.linalg.qr(np.random.default_rng(4).normal(size=(3, 3)))
@@ -329,6 +334,7 @@ def test_a_rotated_volume_is_a_rotated_scene():
     assert relative_rms(found, expected) < 1.5e-2
 
 
+@pytest.mark.any_version
 def test_twice_the_light_is_twice_the_field():
     grid = room_grid((3, 3, 3))
     snapshot = pillars()
@@ -340,6 +346,7 @@ def test_twice_the_light_is_twice_the_field():
     np.testing.assert_allclose(two, 2 * one, rtol=1e-5, atol=1e-6)
 
 
+@pytest.mark.any_version
 def test_light_adds_up():
     """A bake with two lamps is the sum of bakes with one each."""
     grid = room_grid((3, 3, 3))
@@ -353,6 +360,7 @@ def test_light_adds_up():
     np.testing.assert_allclose(fields[0], fields[1] + fields[2], atol=2e-3 * np.abs(fields[0]).max())
 
 
+@pytest.mark.any_version
 def test_what_only_buried_probes_see_does_not_hold_up_the_rest():
     """A hollow of white walls keeps light for very long; probes inside it are invalid, so nobody waits for that."""
     wall, hollow = box((-3, -3, -3), (3, 3, 3))[:, ::-1], box((-1, -1, -1), (1, 1, 1))

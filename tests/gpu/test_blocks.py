@@ -25,7 +25,7 @@ def field_bytes(result):
     )
 
 
-@pytest.mark.parametrize("block", [1, 9])
+@pytest.mark.parametrize("block", [1, pytest.param(9, marks=pytest.mark.any_version)])
 def test_a_furnace_has_no_seams(block):
     grid = Grid.from_bounds([-0.9] * 3, [0.9] * 3, (4, 3, 3) if block > 1 else (2, 2, 1))
     result = bake(furnace(0.9), grid, BakeSettings(face=8, block=block))
@@ -49,6 +49,7 @@ def test_the_memory_budget_changes_no_byte():
     assert field_bytes(results[0]) == field_bytes(results[1])
 
 
+@pytest.mark.any_version
 def test_blocks_see_the_light_that_one_grid_sees():
     """Each block has patches and random numbers of its own: what differs is noise, no step at seams."""
     snapshot = cluttered_room({"rectangle": all_lights()["rectangle"]}, clutter=8)
@@ -63,6 +64,7 @@ def test_blocks_see_the_light_that_one_grid_sees():
     assert abs(relative.mean()) < 0.005
 
 
+@pytest.mark.any_version
 def test_light_in_another_block_tells_a_solid():
     """Probes that see nothing but dark back faces are inside a solid if any probe sees light, in whichever block."""
     room, solid = box((-3, -1, -1), (0, 1, 1)), box((0.5, -1, -1), (3.5, 1, 1))
@@ -80,6 +82,7 @@ def test_light_in_another_block_tells_a_solid():
     assert invalid_counts([whole.field]) == invalid_counts([parts.field]) == {"in_solid": inside.sum()}
 
 
+@pytest.mark.any_version
 def test_a_dark_scene_is_dark_in_all_blocks():
     """Where no probe sees light nothing is invalid, in one block or in many."""
     snapshot = snapshot_of(box(), materials=[Material("grey")])

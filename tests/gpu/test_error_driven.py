@@ -151,6 +151,7 @@ def test_more_passes_make_it_better_and_go_where_they_are_needed(monkeypatch):
     assert ((found - exact) ** 2).mean() < ((first - exact) ** 2).mean()
 
 
+@pytest.mark.any_version
 def test_a_target_below_the_floor_is_refused_in_words_and_the_floor_is_told():
     result = driven(room(), 0.001, kept=["samples", "face"], face=8)
     assert not result.error["met"] and result.error["predicted"] > 0.001

@@ -186,7 +186,7 @@ def test_what_probes_see_mirrored_counts_as_seen(stages, reflected):
     assert 0 < expected.sum() < patches.count
 
 
-@pytest.mark.parametrize("segments", [1, 3])
+@pytest.mark.parametrize("segments", [1, pytest.param(3, marks=pytest.mark.any_version)])
 def test_rays_that_are_mirrored(stages, segments):
     first, count, rays_each = 40, 200, 8
     stages.direct()

@@ -73,9 +73,10 @@ def test_sampled_emitters_against_the_reference(gpu_context):
 
 
 def moved_bakes(snapshot, grid, settings, step):
-    """(P, 3, K, 3) central differences of the bake with its volume moved by ``step`` metres each way."""
+    """(P, 2, K, 3) central differences of the bake with its volume moved by ``step`` metres each way, along X and
+    Z."""
     result = []
-    for axis in np.eye(3):
+    for axis in np.eye(3)[[0, 2]]:
         ahead, behind = (
             bake(snapshot, Grid(moved(grid.matrix, sign * step * axis), grid.resolution), settings).field.coefficients
             for sign in (1, -1)
@@ -114,9 +115,10 @@ def test_gradients_are_what_the_bake_changes_by(gpu_context, room, most):
     snapshot = snapshot_of(
         np.concatenate(parts), None, [Material("grey", (0.6, 0.5, 0.4))], index, lights=lights, world=world
     )
-    settings = BakeSettings(face=24, samples=4, bounces=1, keep_all=True)
-    expected = moved_bakes(snapshot, GRID, settings, 0.06)
-    found = bake(snapshot, GRID, settings).field.gradient
+    grid = Grid.from_bounds([-0.6, -0.2, -0.3], [0.7, 0.2, 0.3], (3, 1, 1))
+    settings = BakeSettings(face=24, samples=2, bounces=1, keep_all=True)
+    expected = moved_bakes(snapshot, grid, settings, 0.06)
+    found = bake(snapshot, grid, settings).field.gradient[:, [0, 2]]
     error = np.sqrt(((found - expected) ** 2).sum() / (expected**2).sum())
     assert error < most
 

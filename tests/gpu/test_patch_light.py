@@ -241,7 +241,7 @@ def test_a_moved_probe_is_a_probe_of_its_new_place():
 
 
 @pytest.mark.any_version
-@pytest.mark.parametrize("capture", ["trace", "raster"])
+@pytest.mark.parametrize("capture", [pytest.param("trace", marks=pytest.mark.nightly), "raster"])
 def test_a_small_memory_budget(capture):
     """Texel surfaces that do not fit are captured again whenever they are needed, and give the same bytes."""
     grid = Grid.from_bounds([-0.91, -0.88, -0.93], [0.92, 0.89, 0.87], (5, 5, 7))

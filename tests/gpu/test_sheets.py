@@ -117,7 +117,7 @@ def test_direct_light_of_both_sides(stages):
         assert close(found[1], deviation, 1e-3).mean() > 0.99
 
 
-@pytest.mark.parametrize("segments", [1, 3])
+@pytest.mark.parametrize("segments", [1, pytest.param(3, marks=pytest.mark.any_version)])
 def test_rays_of_both_sides(stages, segments):
     first, count, rays_each = 40, 200, 8
     hits, brought, reflected = stages.rays(first, count, rays_each, segments)
@@ -129,6 +129,7 @@ def test_rays_of_both_sides(stages, segments):
     assert close(brought, rays.brought, 1e-3)[same.all(axis=1)].mean() > 0.96
 
 
+@pytest.mark.any_version
 def test_final_gather_on_sheets(stages):
     """Texels with light and paths of their own ask both sides as well."""
     stages.connect()
