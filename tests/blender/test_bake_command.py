@@ -16,7 +16,18 @@ import pytest
 from gridlight.core.conventions import ACTIVE, CULLED
 from gridlight.formats import probe_file
 
-SUMMARY_KEYS = ["probes", "iterations", "converged", "ringing", "seconds", "device", "settings", "files", "warnings"]
+SUMMARY_KEYS = [
+    "probes",
+    "invalid_because",
+    "iterations",
+    "converged",
+    "ringing",
+    "seconds",
+    "device",
+    "settings",
+    "files",
+    "warnings",
+]
 BOX = ["--min", "-1.5,-1.5,-1.5", "--max", "1.5,1.5,1.5", "--resolution", "3,3,3"]
 FAST = ["--face", "4", "--no-pictures"]
 
