@@ -181,14 +181,6 @@ vec3 light_arriving(int light, LightSample light_sample, vec3 origin)
   return shadow ? light_along(origin, light_sample.direction, light_sample.distance * 0.9999, group) : vec3(1.0);
 }
 
-/* Irradiance of one light at a surface: one shadow ray to the place on the light that `u` picks. */
-vec3 light_irradiance(int light, vec3 point, vec3 origin, vec3 normal, vec2 u)
-{
-  LightSample light_sample = sample_light(light, point, u);
-  vec3 irradiance = unshadowed_irradiance(light, light_sample, normal);
-  return irradiance == vec3(0.0) ? irradiance : irradiance * light_arriving(light, light_sample, origin);
-}
-
 /* For lights `first` .. `stop`: the place on each of them, and which one is chosen. */
 vec3 numbers_of_lights(int first, int stop, uvec3 key, int index)
 {
@@ -197,12 +189,12 @@ vec3 numbers_of_lights(int first, int stop, uvec3 key, int index)
 }
 
 /* Irradiance of lights `first` .. `stop`: one shadow ray to one of them, chosen by what each sends if nothing stands between (Talbot, Cline and
- * Egbert, "Importance Resampling for Global Illumination", EGSR 2005, with every light a candidate). */
-vec3 lights_irradiance(int first, int stop, vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
+ * Egbert, "Importance Resampling for Global Illumination", EGSR 2005, with every light a candidate). `direction`: to that one. */
+vec3 lights_irradiance(int first, int stop, vec3 point, vec3 origin, vec3 normal, uvec3 key, int index, out vec3 direction)
 {
   vec3 numbers = numbers_of_lights(first, stop, key, index);
   float choice = numbers.z;
-  LightSample best_sample;
+  LightSample best_sample = LightSample(vec3(0.0), 0.0, vec3(0.0));
   vec3 best_irradiance = vec3(0.0);
   int best = -1;
   float best_weight = 0.0, total = 0.0;
@@ -217,6 +209,7 @@ vec3 lights_irradiance(int first, int stop, vec3 point, vec3 origin, vec3 normal
       best = light;
     }
   }
+  direction = best_sample.direction;
   return best < 0 ? vec3(0.0) : best_irradiance * (total / best_weight) * light_arriving(best, best_sample, origin);
 }
 
@@ -224,9 +217,9 @@ vec3 lights_irradiance(int first, int stop, vec3 point, vec3 origin, vec3 normal
 vec3 lamps_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
 {
   int lamps_each = LAMPS_A_RAY;
-  vec3 sum = vec3(0.0);
+  vec3 sum = vec3(0.0), direction;
   for (int first = FIRST_LIGHT; first < light_count; first += lamps_each) {
-    sum += lights_irradiance(first, min(first + lamps_each, light_count), point, origin, normal, key, index);
+    sum += lights_irradiance(first, min(first + lamps_each, light_count), point, origin, normal, key, index, direction);
   }
   return sum;
 }

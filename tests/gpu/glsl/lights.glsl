@@ -5,7 +5,8 @@ void main()
   int i = int(gl_GlobalInvocationID.x);
   if (i < count) {
     vec3 point = element(points, i).xyz;
-    vec3 irradiance = light_irradiance(0, point, point, element(normals, i).xyz, element(places, i).xy);
+    LightSample light_sample = sample_light(0, point, element(places, i).xy);
+    vec3 irradiance = unshadowed_irradiance(0, light_sample, element(normals, i).xyz) * light_arriving(0, light_sample, point);
     imageStore(result, element_position(i), vec4(irradiance, 0.0));
   }
 }
