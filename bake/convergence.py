@@ -25,6 +25,7 @@ AUTO_LIMIT = 512
 MANY_MODES = math.inf  # in place of a factor: the last states tell the limit, see core/extrapolation.py
 _PARALLEL = 0.5  # most sine of the angle between two changes for the tail to be added, per (1 − ratio)
 _SINE_ROUNDING = 1e-6  # squared sine below what float32 sums can tell from zero
+_LEAST = 3  # changes of a series that tell of its limit
 _MOST_RATIO = 0.9985  # above it the tail is too uncertain to add
 _MINOR, _LITTLE = 0.25, 0.25  # share of the patches and of |light| that hollows may have where nobody waits for them
 _ANY = 1e-3  # share of the patches: less is no hollow
@@ -46,6 +47,13 @@ class Convergence:
         self.converged = False
         self.has_hollows = False  # that are still filling with light
         self.reason = ""
+
+    @property
+    def until_decision(self) -> int:
+        """How many more iterations it takes at least until something follows from them: nobody has to wait for the sums
+        of the ones before. From fewer than _LEAST changes of one series nothing does."""
+        ahead = max(_LEAST - len(self._lengths), 1)
+        return ahead if self._bounces is None else min(ahead, self._bounces + 1 - self.iterations)
 
     def add(self, sums: Sums) -> float:
         """Takes the sums of one iteration. Returns the factor to extrapolate by, 0 for none, MANY_MODES where the last
@@ -95,7 +103,7 @@ class Convergence:
                 f"not converged after {AUTO_LIMIT} bounces: each still adds {ratio:.4f} of the one before; "
                 "surfaces that reflect all light never settle, lower their base colour"
             )
-        elif len(self._lengths) >= 3 and self._is_parallel(overlap):
+        elif len(self._lengths) >= _LEAST and self._is_parallel(overlap):
             step = self._lengths[-1] / self._lengths[-2]
             self._slowest = max(self._slowest, step)
             self._lengths.clear()

@@ -15,6 +15,7 @@ import numpy as np
 from ..core.blocks import Block
 from ..core.clearance import Obstacles
 from ..core.conventions import ACTIVE, CULLED
+from ..core.extrapolation import Sums
 from ..core.orientation import ShellVote, inside_solid
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
@@ -242,19 +243,18 @@ class VolumeBake:
         better start. Returns whether it was."""
         convergence = Convergence(self.settings.bounces, self.settings.tolerance)
         while not convergence.done:
+            for ahead in range(convergence.until_decision):
+                with self._stopwatch("light"):
+                    self.backend.light.iterate(bounce=warm or convergence.iterations + ahead > 0)
+                yield
             with self._stopwatch("light"):
-                sums, luminance = self.backend.light.iterate(bounce=warm or convergence.iterations > 0)
+                differences = self.backend.light.differences()
+                first = differences[0][0]
                 # The first step from settled light is by how much its sources changed.
-                if warm and not convergence.iterations and not sums.change <= _SMALL_CHANGE**2 * sums.energy:
+                if warm and not convergence.iterations and not first.change <= _SMALL_CHANGE**2 * first.energy:
                     warm = False
                     continue
-                self.result.energy.append(luminance)
-                factor = convergence.add(sums)
-                self._reporter.advance(1)
-                if factor == MANY_MODES:
-                    self.backend.light.extrapolate_modes()
-                elif factor:
-                    self.backend.light.extrapolate(factor)
+                self._judge(convergence, differences)
             yield
         self.result.iterations = convergence.iterations
         self.result.converged = convergence.converged
@@ -266,6 +266,20 @@ class VolumeBake:
         if convergence.has_hollows:
             yield from self._find_hollows()
         return warm
+
+    def _judge(self, convergence: Convergence, differences: list[tuple[Sums, float]]) -> None:
+        """Tells ``convergence`` of the last iterations, and does what it says."""
+        factor = 0.0
+        for sums, luminance in differences:
+            if convergence.done:
+                return
+            self.result.energy.append(luminance)
+            factor = convergence.add(sums)
+            self._reporter.advance(1)
+        if factor == MANY_MODES:
+            self.backend.light.extrapolate_modes()
+        elif factor:
+            self.backend.light.extrapolate(factor)
 
     def _find_hollows(self) -> Steps[None]:
         """Which active probes see mostly hollows that are still filling with light."""

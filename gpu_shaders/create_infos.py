@@ -258,8 +258,14 @@ def texel_patches_comp(info, defines):
     return {"compute": ["data_lib", "texel_patches_comp"]}
 
 
-def _part_of_light(info) -> None:
-    """Which lamps direct_light_lib takes."""
+def _part_of_light(info, defines: dict) -> None:
+    """Which lamps direct_light_lib takes: none where emitters are sampled, which are a part by themselves."""
+    if "HAS_EMITTERS" in defines:
+        info.define("FIRST_LIGHT", "0")
+        info.define("LAMPS_A_RAY", "1")
+        info.define("light_count", "0")
+        return
+    _ints(info, "first_light", "light_count", "lamps_a_ray")
     info.define("FIRST_LIGHT", "first_light")
     info.define("LAMPS_A_RAY", "lamps_a_ray")
 
@@ -270,8 +276,8 @@ def patch_spread_comp(info, defines):
     slot = _samplers(info, "lights", "patch_points", first=slot)
     _sheets(info, defines, slot, "sheet_numbers")
     _image(info, 0, "spread", pixel="RG32F")
-    _ints(info, "first_patch", "patch_count", "first_light", "light_count", "lamps_a_ray", "point_count", "seed")
-    _part_of_light(info)
+    _ints(info, "first_patch", "patch_count", "point_count", "seed")
+    _part_of_light(info, defines)
     info.local_group_size(64, 1, 1)
     files = ["data_lib", "octahedral_lib", *_light_files(defines), *_sheet_files(defines), "patch_spread_comp"]
     return {"compute": files}
@@ -281,6 +287,7 @@ def _patch_lists(info) -> None:
     """What patch_lists_lib reads but `patches`."""
     for name in ("list_first", "list_count", "list_samples"):
         info.push_constant("IVEC4", name)
+    _ints(info, "samples_each")
 
 
 def patch_direct_comp(info, defines):
@@ -290,8 +297,8 @@ def patch_direct_comp(info, defines):
     _sheets(info, defines, slot, "sheet_numbers")
     _image(info, 0, "sums")
     _patch_lists(info)
-    _ints(info, "first_key", "first_light", "light_count", "lamps_a_ray", "seed")
-    _part_of_light(info)
+    _ints(info, "first_key", "seed")
+    _part_of_light(info, defines)
     info.local_group_size(64, 1, 1)
     files = ["data_lib", "octahedral_lib", *_light_files(defines), *_sheet_files(defines)]
     return {"compute": [*files, "patch_lists_lib", "patch_direct_comp"]}
@@ -315,11 +322,12 @@ def _one_group(info) -> None:
 def patch_change_comp(info, defines):
     _samplers(info, "irradiance_new", "irradiance_old", "irradiance_older", "patch_seen", "brightest")
     _image(info, 0, "change")
-    _ints(info, "patch_count")
+    _ints(info, "patch_count", "result")
     info.define("SLOW", repr(SLOW))
     info.push_constant("FLOAT", "unseen")
     info.push_constant("FLOAT", "tolerance")
-    _one_group(info)
+    info.define("THREADS", "256")
+    info.local_group_size(256, 1, 1)
     return {"compute": ["data_lib", "patch_slow_lib", "patch_change_comp"]}
 
 

@@ -232,18 +232,18 @@ class PatchDirect:
             return
         threads = sum(count * -(-samples // samples_each) for _first, count, samples in lists)
         sums = self.scratch("sums", threads, "samples")
-        shader = program("patch_direct_comp", POINTS=places.each, SAMPLES_EACH=samples_each, **self._defines(part))
+        shader = program("patch_direct_comp", POINTS=places.each, **self._defines(part))
         self._bind(shader, part, places)
         shader.image("sums", sums)
         shader.uniform_int("first_key", (first_key,))
         shader.uniform_int("seed", (self._settings.seed,))
-        _bind_lists(shader, chosen, lists)
+        _bind_lists(shader, chosen, lists, samples_each)
         dispatch_linear(shader, threads)
-        shader = program("patch_mean_comp", SAMPLES_EACH=samples_each)
+        shader = program("patch_mean_comp")
         shader.uniform_sampler("sums", sums)
         shader.image("direct", target)
         shader.uniform_int("begins", (int(begins),))
-        _bind_lists(shader, chosen, lists)
+        _bind_lists(shader, chosen, lists, samples_each)
         dispatch_linear(shader, entries)
 
     def _defines(self, part: Part) -> dict:
@@ -251,11 +251,14 @@ class PatchDirect:
         return defines | self._scene.sheet_defines
 
     def _bind(self, shader, part: Part, places: Places) -> None:
-        (self._scene.bind_lights if part == EMITTERS else self._scene.bind_lamps)(shader)
-        first, stop = part if isinstance(part, tuple) else (0, 0)
-        shader.uniform_int("first_light", (first,))
-        shader.uniform_int("light_count", (stop,))
-        shader.uniform_int("lamps_a_ray", (self._lamps_a_ray,))
+        if part == EMITTERS:
+            self._scene.bind_light_of_emitters(shader)
+            self._scene.bind(shader, "lights")  # declared though not read
+        else:
+            self._scene.bind_lamps(shader)
+            first, stop = part if isinstance(part, tuple) else (0, 0)
+            for name, value in (("first_light", first), ("light_count", stop), ("lamps_a_ray", self._lamps_a_ray)):
+                shader.uniform_int(name, (value,))
         shader.uniform_sampler("patch_points", places.points)
         self._scene.bind_sheets(shader, places.sheets)
 
@@ -296,9 +299,10 @@ def _cut(lists: list[_List], start: int, stop: int) -> list[_List]:
     return cut
 
 
-def _bind_lists(shader, chosen, lists: list[_List]) -> None:
-    """``lists`` of ``chosen`` as patch_lists_lib.glsl reads them."""
+def _bind_lists(shader, chosen, lists: list[_List], samples_each: int) -> None:
+    """``lists`` of ``chosen`` as patch_lists_lib.glsl reads them; ``samples_each``: that a thread takes."""
     padded = [*lists, *[(0, 0, 1)] * (_MOST_LISTS - len(lists))]
     shader.uniform_sampler("patches", chosen)
+    shader.uniform_int("samples_each", (samples_each,))
     for name, values in zip(("list_first", "list_count", "list_samples"), zip(*padded)):
         shader.uniform_int(name, values)

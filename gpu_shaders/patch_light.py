@@ -28,6 +28,7 @@ from .scene_textures import SceneTextures
 from .textures import allocate, numbers, read, scratch, upload
 
 _RAYS_AT_ONCE = 1 << 20
+_CHANGE_GROUPS = 32  # that compare iterations
 _UNSEEN = 1e-6  # weight of patches that no probe sees where iterations are compared: light may still be on its way
 
 
@@ -77,7 +78,8 @@ class PatchLight:
         self._scene, self._settings = scene, settings
         self.world_texels = world_texels
         self._direct = PatchDirect(scene, settings, pace)
-        self._change = scratch(2, "sums")
+        self._change = scratch(3 * _CHANGE_GROUPS * STATES, "sums")  # of the iterations that nobody was told of yet
+        self._untold = 0
         self._brightest: gpu.types.GPUTexture | None = None  # of the light that bounces begin with, where it is known
 
     @property
@@ -225,16 +227,16 @@ class PatchLight:
         """Newest irradiance, an element a patch."""
         return self._irradiance[0]
 
-    def iterate(self, bounce: bool) -> tuple[Sums, float]:
-        """The first irradiance, of direct light, or one bounce more. Returns sums over patches in probes' sight, all to
-        one scale; of their luminance to none."""
+    def iterate(self, bounce: bool) -> None:
+        """The first irradiance, of direct light, or one bounce more. ``differences`` tells how they differ; STATES
+        iterations may go before it is asked."""
         self._irradiance.insert(0, self._irradiance.pop())
         brought, ends, reflected = self._brought.texture, self._ends.texture, self._reflected.texture
         patches = _Receivers(self.count, self.direct, brought, ends, reflected, self._rays_each)
         self._bounce(patches, self._irradiance[1], self._irradiance[0], bounce)
-        return self._compare(*self._irradiance[:3])
+        self._compare(*self._irradiance[:3])
 
-    def _compare(self, new, old, older) -> tuple[Sums, float]:
+    def _compare(self, new, old, older) -> None:
         if self._brightest is None:
             self._brightest = scratch(1, "patches", "R32F")
             reduce_patches(self.direct, 0, self.count, self._brightest, 0, others=self._brought.texture)
@@ -247,9 +249,22 @@ class PatchLight:
         shader.uniform_float("tolerance", self._settings.tolerance)
         shader.image("change", self._change)
         shader.uniform_int("patch_count", (self.count,))
-        gpu.compute.dispatch(shader, 1, 1, 1)
-        (energy, change, overlap, luminance), (scale, *others) = read(self._change, 2).tolist()
-        return Sums(energy, change, overlap, *others), luminance / scale
+        shader.uniform_int("result", (3 * _CHANGE_GROUPS * self._untold,))
+        gpu.compute.dispatch(shader, _CHANGE_GROUPS, 1, 1)
+        self._untold += 1
+
+    def differences(self) -> list[tuple[Sums, float]]:
+        """Of each iteration since this was asked last: sums over patches in probes' sight, all to one scale; of their
+        luminance to none. Waits for the GPU."""
+        rows = read(self._change, 3 * _CHANGE_GROUPS * self._untold).reshape(-1, _CHANGE_GROUPS, 3, 4)
+        self._untold = 0
+        told = []
+        for groups in rows.astype(float):
+            (energy, change, overlap, luminance), (patches, slow, *others) = groups[:, :2].sum(axis=0).tolist()
+            told.append(
+                (Sums(energy, change, overlap, slow / max(patches, 1e-30), *others), luminance / groups[0, 2, 0])
+            )
+        return told
 
     def _bounce(self, receivers: _Receivers, source, target, bounce: bool = True) -> None:
         """Irradiance of ``receivers`` into ``target``: what reaches them without a bounce, and with ``bounce`` what

@@ -273,9 +273,7 @@ class SceneTextures:
     def bind_lights(self, shader) -> None:
         """Binds what a shader compiled with ``light_defines`` declares: all lamps, suns and sampled emitters."""
         if self.emitter_count:
-            self.bind_surfaces(shader)
-            self.bind_emitters(shader)
-            shader.uniform_float("emitter_reach", self.emitter_reach)
+            self.bind_light_of_emitters(shader)
         else:
             self.bind_rays(shader)
         self.bind(shader, "lights")
@@ -286,6 +284,12 @@ class SceneTextures:
         self.bind_rays(shader)
         self.bind(shader, "lights")
         shader.uniform_int("light_count", (self.lamp_count,))
+
+    def bind_light_of_emitters(self, shader) -> None:
+        """Binds what a shader that lights points by sampled emitters declares, but lamps."""
+        self.bind_surfaces(shader)
+        self.bind_emitters(shader)
+        shader.uniform_float("emitter_reach", self.emitter_reach)
 
     def bind_emitters(self, shader) -> None:
         self.bind(shader, "emitters")

@@ -1,8 +1,8 @@
 /* How far iterations are apart: sums over the patches that probes see, of the last three irradiances.
  *
- * Dispatch: one group of THREADS; fixed order of summation. Writes two texels: |new|², |new − old|², (new − old)·(old − older),
- * luminance, all of irradiance times a scale, so that squares of 1e-30 and of 1e30 both fit; and that scale, the share of the patches
- * that are slow, |new|² and |what is still to come|² of the others.
+ * Dispatch: groups of THREADS, each a share of the patches; fixed order of summation. Writes three elements a group, from `result` on:
+ * |new|², |new − old|², (new − old)·(old − older), luminance, all of irradiance times a scale, so that squares of 1e-30 and of 1e30 both fit |
+ * number of patches, of slow patches, |new|² and |what is still to come|² of the others | that scale.
  */
 
 const int AT_ONCE = 4; /* patches of a thread that are on their way from memory together */
@@ -27,10 +27,12 @@ vec4 sum_of_group(vec4 mine, int lane)
 void main()
 {
   int lane = int(gl_LocalInvocationID.x);
+  int group = int(gl_WorkGroupID.x);
+  int stride = AT_ONCE * THREADS * int(gl_NumWorkGroups.x);
   float unit = element(brightest, 0).x;
   float scale = unit > 1.0e-37 && unit < 1.0e37 ? 1.0 / unit : 1.0; /* light that is not finite is found by its sums */
   vec4 sum = vec4(0.0), others = vec4(0.0);
-  for (int first = lane; first < patch_count; first += AT_ONCE * THREADS) {
+  for (int first = AT_ONCE * THREADS * group + lane; first < patch_count; first += stride) {
     for (int k = 0; k < AT_ONCE; k++) {
       int i = min(first + k * THREADS, patch_count - 1);
       vec3 fresh = element(irradiance_new, i).rgb * scale;
@@ -46,7 +48,8 @@ void main()
   sum = sum_of_group(sum, lane);
   others = sum_of_group(others, lane);
   if (lane == 0) {
-    imageStore(change, ivec2(0), sum);
-    imageStore(change, ivec2(1, 0), vec4(scale, others.y / max(others.x, 1.0e-30), others.zw));
+    imageStore(change, element_position(result + 3 * group), sum);
+    imageStore(change, element_position(result + 3 * group + 1), others);
+    imageStore(change, element_position(result + 3 * group + 2), vec4(scale, 0.0, 0.0, 0.0));
   }
 }

@@ -1,6 +1,6 @@
 /* Direct light of patches: irradiance of lamps and sampled emitters at `samples` places spread over the patch's points.
  *
- * Dispatch: a thread for SAMPLES_EACH of the samples of a patch, see patch_lists_lib; groups of 64. patch_mean_comp puts them together.
+ * Dispatch: a thread for samples_each of the samples of a patch, see patch_lists_lib; groups of 64. patch_mean_comp puts them together.
  * (A thread for all samples of a patch would be simpler, but software drivers end every loop of a thread that has gone round 65 535 times.)
  * Fewer samples than points take one of each equal run of points, all the same one of their runs, which is random.
  * The key of a number is (first_key + patch, light, seed); its index counts samples, so the points of a patch share one stratified sequence.
@@ -28,7 +28,7 @@ void main()
     return;
   }
   int samples = list_samples[entry.list];
-  int first = entry.run * SAMPLES_EACH;
+  int first = entry.run * samples_each;
   int patch_index = patch_of(entry);
   uvec3 key = uvec3(uint(first_key + patch_index), 0u, uint(seed));
   int shift = int(pcg3d(key + uvec3(0u, 0x85EBCA6Bu, 0u)).x % uint(POINTS));
@@ -36,7 +36,7 @@ void main()
 #ifdef HAS_LINKS
   lit_role = role_of_sheet(int(element(sheet_numbers, patch_index).x));
 #endif
-  for (int i = first; i < min(first + SAMPLES_EACH, samples); i++) {
+  for (int i = first; i < min(first + samples_each, samples); i++) {
     int place = samples < POINTS ? (i * POINTS + shift) / samples : i % POINTS;
     vec4 at = element(patch_points, POINTS * patch_index + place);
     vec3 normal = unpack_normal(at.w);

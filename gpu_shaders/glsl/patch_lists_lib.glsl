@@ -1,12 +1,12 @@
 /* Lists of patches that get direct light, up to LISTS of them: entries list_first … list_first + list_count of `patches` get list_samples
- * samples each, in runs of SAMPLES_EACH, a thread a run. patch_direct_comp and patch_mean_comp walk them in the same order.
+ * samples each, in runs of samples_each, a thread a run. patch_direct_comp and patch_mean_comp walk them in the same order.
  */
 
 const int LISTS = 4;
 
 int runs_of(int list)
 {
-  return (list_samples[list] + SAMPLES_EACH - 1) / SAMPLES_EACH;
+  return (list_samples[list] + samples_each - 1) / samples_each;
 }
 
 struct Entry {

@@ -189,7 +189,8 @@ class Stages:
 
     def iterate(self, bounce):
         """(N, 3) irradiance after one iteration more, the sums that judge it, and its luminance."""
-        sums, luminance = self.light.iterate(bounce)
+        self.light.iterate(bounce)
+        ((sums, luminance),) = self.light.differences()
         return read(self.light.irradiance, self.light.count)[:, :3].astype(float), sums, luminance
 
     # Probes

@@ -12,12 +12,14 @@ def run(operator, source, tolerance=2e-3, bounces=None):
     """Iterates x ← source + operator·x as a bake does, extrapolating when told to. Returns (state, convergence)."""
     watch = Convergence(bounces, tolerance)
     older = old = np.zeros_like(source)
-    states = []
+    states, ahead = [], 0
     while not watch.done:
+        ahead = ahead or watch.until_decision
         new = source + operator @ old if watch.iterations else source.copy()
         change = new - old
         factor = watch.add(Sums(float(new @ new), float(change @ change), float(change @ (old - older))))
-        assert watch.iterations < 2 * AUTO_LIMIT
+        ahead -= 1
+        assert not (ahead and factor) and watch.iterations < 2 * AUTO_LIMIT
         states.insert(0, new)
         if factor == MANY_MODES:
             limit = reduced_rank(np.stack(states[:STATES])[..., None])
