@@ -54,6 +54,41 @@ bool is_hidden(Way way, vec3 origin)
   return trace_any(origin, way.direction, way.hit.distance * 0.999);
 }
 
+/* What the ray through the middle of a texel has met on `triangle`. */
+Way met_in_middle(int triangle, float distance, vec3 origin, vec3 direction)
+{
+  vec2 barycentric = barycentric_of(triangle, origin + direction * distance);
+  Surface surface = resolve_surface(triangle, barycentric, origin, direction, 2.0 / float(FACE));
+  vec2 inside = max(barycentric, vec2(0.0)); /* rasterised triangles reach over their edges, see texel_hits_comp */
+  inside /= max(inside.x + inside.y, 1.0);
+  if (inside != barycentric) {
+    barycentric = inside;
+    surface.position = interpolate(element(triangle_corners, 3 * triangle).xyz, element(triangle_corners, 3 * triangle + 1).xyz,
+                                   element(triangle_corners, 3 * triangle + 2).xyz, inside);
+  }
+  surface.albedo *= passed_to(origin, direction, distance * 0.9999);
+  return Way(direction, Hit(distance, triangle, barycentric), surface, vec3(1.0), vec3(0.0));
+}
+
+/* Radiance of lamps that the texel mirrors, in a lobe of this width: the mean of looks from places all over it. */
+vec3 lamps_looked_at(Gloss gloss, Way middle, vec3 origin, ivec2 texel, float width, uvec3 place_key, uvec3 light_key)
+{
+  vec3 sum = vec3(0.0);
+  int looks = light_count > 0 ? clamp(LOOKS_IN_ALL / light_count, LEAST_LOOKS, LOOKS) : 0;
+  for (int i = 0; i < looks; i++) {
+    int look = (texel.y * FACE + texel.x) * looks + i;
+    Way way = way_through(sample_r3(place_key, look).xy, middle, origin, texel);
+    vec3 light = lamps_in_gloss(gloss, way.surface, beginning(way), -way.direction, width, light_key, look);
+    uvec3 event = reflection_event(light_key, look, 0);
+    Reflection reflection = reflect_at(gloss, way.surface, middle.hit.triangle, -way.direction, event, sample_r2(light_key, look));
+    light += reflection.mirrored * lamps_mirrored(way, reflection.direction, width);
+    if (light != vec3(0.0) && !is_hidden(way, origin)) {
+      sum += light / float(looks);
+    }
+  }
+  return sum;
+}
+
 void main()
 {
   ivec3 id = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, first_probe);
@@ -81,30 +116,9 @@ void main()
 #ifdef HAS_LINKS
     lit_role = role_of_triangle(triangle);
 #endif
-    vec2 barycentric = barycentric_of(triangle, slot.xyz + direction * abs(seen.z));
-    Surface surface = resolve_surface(triangle, barycentric, slot.xyz, direction, 2.0 / float(FACE));
-    vec2 inside = max(barycentric, vec2(0.0)); /* rasterised triangles reach over their edges, see texel_hits_comp */
-    inside /= max(inside.x + inside.y, 1.0);
-    if (inside != barycentric) {
-      barycentric = inside;
-      surface.position = interpolate(element(triangle_corners, 3 * triangle).xyz, element(triangle_corners, 3 * triangle + 1).xyz,
-                                     element(triangle_corners, 3 * triangle + 2).xyz, inside);
-    }
-    surface.albedo *= passed_to(slot.xyz, direction, abs(seen.z) * 0.9999);
-    middle = Way(direction, Hit(abs(seen.z), triangle, barycentric), surface, vec3(1.0), vec3(0.0));
+    middle = met_in_middle(triangle, abs(seen.z), slot.xyz, direction);
     width = max(gloss.alpha, blur_of(middle, slot.xyz, id.xy));
-    int looks = light_count > 0 ? clamp(LOOKS_IN_ALL / light_count, LEAST_LOOKS, LOOKS) : 0;
-    for (int i = 0; i < looks; i++) {
-      int look = number * looks + i;
-      Way way = way_through(sample_r3(place_key, look).xy, middle, slot.xyz, id.xy);
-      vec3 light = lamps_in_gloss(gloss, way.surface, beginning(way), -way.direction, width, light_key, look);
-      uvec3 event = reflection_event(light_key, look, 0);
-      Reflection reflection = reflect_at(gloss, way.surface, triangle, -way.direction, event, sample_r2(light_key, look));
-      light += reflection.mirrored * lamps_mirrored(way, reflection.direction, width);
-      if (light != vec3(0.0) && !is_hidden(way, slot.xyz)) {
-        brought += light / float(looks);
-      }
-    }
+    brought = lamps_looked_at(gloss, middle, slot.xyz, id.xy, width, place_key, light_key);
   }
   for (int ray = 0; ray < REFLECTIONS; ray++) {
     vec4 end = vec4(0.0, 0.0, 0.0, -1.0);

@@ -1,4 +1,7 @@
-/* The world behind the scene, vertex stage: one triangle over the whole view, at its far end. */
+/* The world behind the scene, vertex stage: one triangle over the whole view, at its far end.
+ *
+ * Draw: 3 vertices.
+ */
 
 void main()
 {

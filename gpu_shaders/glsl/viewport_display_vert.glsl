@@ -1,4 +1,7 @@
-/* The finished view, vertex stage: one triangle over the whole region. */
+/* The finished view, vertex stage: one triangle over the whole region.
+ *
+ * Draw: 3 vertices.
+ */
 
 void main()
 {
