@@ -170,7 +170,14 @@ def check(scene, samples=16):
 
 # Of each kind what Blender's versions store in another way; the others differ in numbers only.
 STORED = ("point", "point, not normalized", "spot, scaled", "sun, angle", "area, ellipse", "exposure", "temperature")
-CASES = [pytest.param(n, marks=() if n in STORED else pytest.mark.any_version) for n in LIGHTS]
+# These go through nothing that others do not: a colour ("temperature"), no radius and no norm ("point, not
+# normalized"), a wider sun ("sun, angle"), a spot without blend ("spot, blend").
+SELDOM = ("point, coloured", "point, sharp, not normalized", "sun, wide", "spot")
+ONCE = [pytest.mark.any_version]
+CASES = [
+    pytest.param(name, marks=[] if name in STORED else [pytest.mark.nightly] if name in SELDOM else ONCE)
+    for name in LIGHTS
+]
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -195,7 +202,7 @@ def with_nodes(lamp, kind, **inputs):
     return node, glow.inputs["Strength"], tree.links
 
 
-@pytest.mark.parametrize("output", ["Linear", "Constant"])
+@pytest.mark.parametrize("output", ["Linear", pytest.param("Constant", marks=pytest.mark.nightly)])
 @pytest.mark.any_version
 def test_falloff_of_a_lamp(gpu_context, output):
     scene = wall_and_screen(output)

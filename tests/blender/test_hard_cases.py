@@ -114,6 +114,7 @@ def add_dust(scene, count):
     bpy.context.view_layer.update()
 
 
+@pytest.mark.any_version
 @pytest.mark.parametrize("count", [5_000, pytest.param(100_000, marks=pytest.mark.nightly)])
 def test_many_tiny_objects(gpu_context, count):
     expected = irradiance(run(read_scene(room()), volume()), volume().positions())
@@ -186,7 +187,13 @@ def flat_image(name, width, height, color, space="sRGB"):
 
 
 @pytest.mark.parametrize(
-    "size", [(1, 1), (1, 777), (4096, 4096), pytest.param((8192, 8192), marks=pytest.mark.nightly)]
+    "size",
+    [
+        pytest.param((1, 1), marks=pytest.mark.any_version),
+        pytest.param((1, 777), marks=pytest.mark.any_version),
+        (4096, 4096),
+        pytest.param((8192, 8192), marks=pytest.mark.nightly),
+    ],
 )
 def test_textures_of_every_size(gpu_context, size):
     """One colour, whatever its number of pixels."""

@@ -121,7 +121,7 @@ def test_explore_mode_is_like_its_picture(person):
         person.module("operators.explore").stop_running()
 
 
-@in_blender(timeout=180.0)
+@in_blender(backends=("opengl",), timeout=180.0)
 def test_report_panel_is_like_its_picture(person):
     build(person)
     volume = bpy.data.objects["Room"]

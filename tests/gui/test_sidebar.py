@@ -6,7 +6,7 @@ import numpy as np
 from harness import in_blender
 
 
-@in_blender()
+@in_blender(backends=("opengl",))
 def test_gallery_from_the_add_menu_opens_the_tab(person):
     menu_bar = person.rectangle(person.region("HEADER"))
     yield from person.click_text("Add", menu_bar)
