@@ -83,6 +83,7 @@ def light_in(where, capture):
     return irradiance(result, np.concatenate([grid.positions(), inside]))
 
 
+@pytest.mark.any_version
 @pytest.mark.parametrize(
     "where, capture",
     [(where, "trace") for where in PLACES if where != "the origin"]
