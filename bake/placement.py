@@ -18,6 +18,8 @@ from ..gpu_shaders.backend import GpuBackend
 from ..gpu_shaders.probe_views import exits, sightings
 from .batches import Batches
 
+_WALLS_OF_A_CORNER = 3
+
 
 @dataclass
 class Placement:
@@ -133,34 +135,54 @@ def _statistics(batches: Batches, index: int, backend: GpuBackend) -> Steps[None
 def _relocate(
     placement: Placement, batches: Batches, backend: GpuBackend, grid: Grid, obstacles: Callable[[], Obstacles]
 ) -> Steps[None]:
-    """Moves probes that stand in or behind walls. One that still does at its new place goes back; one that came out
-    into a dark room stays, or the wall of that room would be left to probes of the lit one next door. Where they came
-    out, and in rooms with their normals outwards, they keep clear of surfaces too."""
-    candidates = np.flatnonzero(placement.misplaced)
+    """Moves probes that stand in or behind walls, through as many as meet in a corner. One that still does at its last
+    place goes home; one that came out into a dark room stays, or the wall of that room would be left to probes of the
+    lit one next door. Where they came out, and in rooms with normals outwards, they keep clear of surfaces too."""
     step = placement.step
+    leaving = placement.misplaced
+    beside = ~placement.misplaced & ~placement.by_hand & (placement.shares[:, 3] > 0)  # others were kept clear before
+    for _ in range(_WALLS_OF_A_CORNER):
+        before = step.copy()
+        yield from _step_out(placement, np.flatnonzero(leaving), batches, backend, grid)
+        settled = beside | (step != before).any(axis=1)
+        if settled.any():
+            yield from _keep_clear(placement, settled, batches, grid, obstacles)
+        changed = (step != before).any(axis=1)
+        if not changed.any():
+            break
+        yield from _stand(placement, np.flatnonzero(changed), batches, backend)
+        leaving = changed & placement.misplaced & placement.misplaced_now()
+        beside = np.zeros_like(beside)
+    back = placement.moved & placement.misplaced & placement.misplaced_now()
+    if back.any():
+        placement.went_back |= back
+        step[back] = 0.0
+        yield from _stand(placement, np.flatnonzero(back), batches, backend)
+
+
+def _step_out(
+    placement: Placement, leaving: np.ndarray, batches: Batches, backend: GpuBackend, grid: Grid
+) -> Steps[None]:
+    """Moves probes ``leaving`` (L,) through the nearest surface, where one is near enough."""
     for index in range(batches.count):
-        slots = batches.slots_of(index, candidates)
+        slots = batches.slots_of(index, leaving)
         if len(slots):
             surfaces = yield from batches.bound(index)
             found = exits(backend, surfaces, slots - surfaces.first)
-            step[slots] = relocation.moves(grid, placement.home[slots], found)
+            placement.step[slots] += relocation.moves(grid, placement.home[slots], found, placement.step[slots])
         yield
-    settled = (~placement.misplaced | placement.moved) & ~placement.by_hand
-    settled &= placement.moved | (placement.shares[:, 3] > 0)  # others are behind nothing and were kept clear before
+
+
+def _keep_clear(
+    placement: Placement, settled: np.ndarray, batches: Batches, grid: Grid, obstacles: Callable[[], Obstacles]
+) -> Steps[None]:
+    """Moves probes ``settled`` (S,) off surfaces that are too near."""
 
     def keep_clear() -> np.ndarray:
-        at = (placement.home + step)[settled]
+        at = (placement.home + placement.step)[settled]
         return clearance.keep_clear(grid, placement.nodes[settled], at, obstacles(), also_behind=True)
 
-    step[settled] = (yield from batches.pace.in_background(keep_clear)) - placement.home[settled]
-    moved = np.flatnonzero(placement.moved)
-    if not len(moved):
-        return
-    yield from _stand(placement, moved, batches, backend)
-    back = moved[placement.misplaced_now()[moved] & placement.misplaced[moved]]
-    placement.went_back[back] = True
-    step[back] = 0.0
-    yield from _stand(placement, back, batches, backend)
+    placement.step[settled] = (yield from batches.pace.in_background(keep_clear)) - placement.home[settled]
 
 
 def _stand(placement: Placement, changed: np.ndarray, batches: Batches, backend: GpuBackend) -> Steps[None]:

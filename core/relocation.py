@@ -3,7 +3,8 @@
 
 A volume that reaches into its walls has a layer of nodes that see nothing, while the wall's surface then reads only
 the next layer inside. A probe without light whose nearest surface is close is captured from the other side of that
-surface, never farther than half a cell from its node, so that it stays the nearest probe of its part of the room.
+surface, never farther than half a cell from its node, so that it stays the nearest probe of its part of the room. In an
+edge or a corner of a room there is another wall behind the first: ways out may follow one another.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ _LEAST_BEHIND = 0.25  # share of back faces, or of background, in sight of a pro
 _REACH = 0.5  # cells
 _MARGIN = 0.05  # cells between a moved probe and the surface it came through
 _ALIKE = 1e-3  # relative difference of costs that tells nothing
+_BACK = 0.15  # cosine beyond which a way leads back to where a probe came from
 _OUTWARD_PENALTY = 0.5  # how much farther than inwards the way out of the volume counts
 
 
@@ -27,11 +29,12 @@ def misplaced(shares: np.ndarray, light_elsewhere: bool = False) -> np.ndarray:
     return inside_solid(shares, light_elsewhere) | (dark & (np.maximum(shares[:, 1], shares[:, 3]) > _LEAST_BEHIND))
 
 
-def moves(grid: Grid, positions: np.ndarray, exits: np.ndarray) -> np.ndarray:
-    """(L, 3) displacement in metres of probes at world ``positions`` (L, 3), 0 where no exit is near enough.
+def moves(grid: Grid, home: np.ndarray, exits: np.ndarray, moved: np.ndarray) -> np.ndarray:
+    """(L, 3) displacement in metres of probes that came from world ``home`` (L, 3) and ``moved`` (L, 3) so far, 0 where
+    no exit is near enough.
 
     ``exits`` (L, 6, 4) holds offset and distance of the nearest surface in each cube face. Ways towards the volume's
-    centre are preferred: what lies outside is rarely meant.
+    centre are preferred: what lies outside is rarely meant. None leads back.
     """
     offset, distance = exits[..., :3].astype(float), exits[..., 3].astype(float)
     margin = _MARGIN * float(grid.cell_size().min())
@@ -40,13 +43,14 @@ def moves(grid: Grid, positions: np.ndarray, exits: np.ndarray) -> np.ndarray:
     step = direction * np.minimum(length, 1e12)[..., None]
     inverse = np.linalg.inv(grid.matrix)[:3, :3]
     spans = np.maximum(np.array(grid.resolution) - 1, 1) / 2.0
-    in_cells = np.abs(step @ inverse.T) * spans
+    in_cells = np.abs((moved[:, None] + step) @ inverse.T) * spans
     near = (in_cells <= _REACH).all(axis=-1)
-    inward = grid.center - positions
+    back = np.einsum("lfi,li->lf", direction, moved) < -_BACK * np.linalg.norm(moved, axis=1)[:, None]
+    inward = grid.center - home - moved
     inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), 1e-20)
     cost = length * (1.0 + _OUTWARD_PENALTY * (1.0 - np.einsum("lfi,li->lf", direction, inward)))
-    cost = np.where(near, cost, np.inf)
+    cost = np.where(near & ~back, cost, np.inf)
     # Of ways that are alike the first one: rounding must not decide where a probe stands.
     best = (cost <= (1.0 + _ALIKE) * cost.min(axis=1, keepdims=True)).argmax(axis=1)
-    row = np.arange(len(positions))
+    row = np.arange(len(home))
     return np.where(np.isfinite(cost[row, best])[:, None], step[row, best], 0.0)

@@ -106,6 +106,18 @@ def test_probes_on_surfaces_edges_and_corners(plain, inset):
     check_room(bake_room(grid((5, 4, 4), inset)), plain, 0.15)
 
 
+def test_probes_come_out_of_edges_and_corners(plain):
+    """Two and three walls deep: of a volume that has all but one of its nodes in the walls those in edges come out, and
+    of corners most (a cube face shows only what is nearest in it, and that may be the way back)."""
+    result = bake_room(grid((3, 3, 3), -0.1))
+    active = result.field.state == ACTIVE
+    in_walls = (np.abs(result.field.grid.positions()) > HALF).sum(axis=1)
+    assert active[in_walls < 3].all() and active[in_walls == 3].sum() >= 5
+    stands = result.field.grid.positions() + result.field.offset
+    assert (np.abs(stands[active]) < HALF).all()
+    check_room(result, plain, 0.3)
+
+
 def test_probes_inside_a_solid_are_invalid_and_light_nothing():
     """A block half as wide as the room, some nodes deep inside it: the light around it does not know them."""
     block = box((-0.9, -0.9, -1.25), (0.9, 0.9, 0.2))
