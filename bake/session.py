@@ -55,6 +55,7 @@ class BakeSession(VolumeBake):
         self.snapshot = snapshot
         captures = self._batches.captures
         had_emitters, had_gloss = self.backend.scene.emitter_count > 0, self.backend.scene.has_gloss
+        had_faint_gloss = self.backend.scene.has_faint_gloss
         order = self.backend.scene.hierarchy.order
         with self._stopwatch("setup"):
             self._reporter.phase("upload")
@@ -67,6 +68,7 @@ class BakeSession(VolumeBake):
         if changes.world or changes.emission or changes.reflectance:
             rebind |= yield from self._resolve()
         rebind |= changes.reflectance and (had_gloss or self.backend.scene.has_gloss)  # rays are mirrored elsewhere
+        rebind |= had_faint_gloss != self.backend.scene.has_faint_gloss
         if not rebind:
             rebind = not (yield from self._light_again(changes, had_emitters, live))
         if rebind:
@@ -85,6 +87,9 @@ class BakeSession(VolumeBake):
         assert relit is not None
         emitters = changes.emission and (had_emitters or self.backend.scene.emitter_count > 0)
         lamps = self._changed_lamps(changes)
+        if changes.reflectance and self.backend.scene.has_faint_gloss:  # surfaces take light in another way
+            light.patches.forget_couplings()
+            lamps[:], emitters = True, self.backend.scene.emitter_count > 0
         if lamps.any() or changes.lights_removed or changes.world or emitters:
             relit.lights_direct = yield from self._stopwatch.steps("light", light.light_again(lamps, emitters))
             relit.patches_lit = light.count if relit.lights_direct or emitters else 0

@@ -12,6 +12,7 @@ import numpy as np
 
 from .cubemap import direction_to_texel, texel_solid_angles
 from .emitters import CANDIDATES, PROBE_POINTS, PROBE_RAYS, reach
+from .faint_gloss import coupled
 from .reference_scene import ReferenceScene, Surfaces
 from .sampling import WeightedChoice, keys_of, sample_cosine, sample_r2, sample_r3, shifted
 from .settings import BakeSettings
@@ -87,20 +88,34 @@ class ReferenceEmitters:
     # ------------------------------------------------------------------------------------------------------------------
 
     def irradiance(
-        self, points: np.ndarray, origins: np.ndarray, normals: np.ndarray, keys: np.ndarray, index, role: np.ndarray
+        self,
+        points: np.ndarray,
+        origins: np.ndarray,
+        normals: np.ndarray,
+        keys: np.ndarray,
+        index,
+        role: np.ndarray,
+        coupling: np.ndarray | None = None,
     ) -> np.ndarray:
         """(N, 3) irradiance at ``points`` (N, 3) by sample ``index`` of the sequences of ``keys`` (N, 3): one point on
         the emitters and one direction about the normal, weighted by the balance heuristic. Rays start at ``origins``
-        (N, 3), surfaces have ``role`` (N,) in light linking."""
-        return self._by_points(points, origins, normals, keys, index, role) + self.by_directions(
-            origins, normals, keys, index, role
+        (N, 3), surfaces have ``role`` (N,) in light linking and take light by their ``coupling`` (N, 4)."""
+        return self._by_points(points, origins, normals, keys, index, role, coupling) + self.by_directions(
+            origins, normals, keys, index, role, coupling
         )
 
     def unshadowed(self, points: np.ndarray, normals: np.ndarray, keys: np.ndarray, index, role) -> np.ndarray:
         """(N, 3) irradiance by candidate ``index`` of the sequences of ``keys`` (N, 3) if nothing stands between."""
         return self._arrival(self.sample(sample_r3(keys, index).astype(float)), points, normals, role).irradiance
 
-    def _arrival(self, emitter: EmitterSamples, points: np.ndarray, normals: np.ndarray, role: np.ndarray) -> _Arrival:
+    def _arrival(
+        self,
+        emitter: EmitterSamples,
+        points: np.ndarray,
+        normals: np.ndarray,
+        role: np.ndarray,
+        coupling: np.ndarray | None = None,
+    ) -> _Arrival:
         """What points on the emitters answer for."""
         offset = emitter.point - points
         squared = np.maximum(np.einsum("ni,ni->n", offset, offset), 1e-20)
@@ -111,7 +126,9 @@ class ReferenceEmitters:
         share = self._point_share(emitter.group, emitter.density, distance, surface_cosine, emitter_cosine)
         factor = surface_cosine * emitter_cosine / (squared * emitter.density) * share
         factor = np.where(self.scene.falls_on(emitter.group, role), factor, 0.0)
-        return _Arrival(emitter.radiance * factor[:, None], emitter.point, emitter.group)
+        irradiance = emitter.radiance * factor[:, None]
+        irradiance = irradiance if coupling is None else irradiance * coupled(coupling, surface_cosine)
+        return _Arrival(irradiance, emitter.point, emitter.group)
 
     def _point_share(self, group, density, distance, surface_cosine, emitter_cosine) -> np.ndarray:
         """(N,) share of the light from an emitter that points on emitters answer for; directions about the normal
@@ -122,14 +139,14 @@ class ReferenceEmitters:
         alone = (distance >= self.reach) | ~self.scene.links.blocks.all(axis=0)[group]
         return np.where(alone, 1.0, points / np.maximum(points + directions, 1e-300))
 
-    def _by_points(self, points, origins, normals, keys, index, role) -> np.ndarray:
+    def _by_points(self, points, origins, normals, keys, index, role, coupling) -> np.ndarray:
         """Resampled: CANDIDATES points by power, one of them by what it would send if nothing stood between; a single
         number chooses among them one after the other."""
         choice = WeightedChoice(sample_r3(shifted(keys, _CHOICE_STREAM, 0, 0), index)[:, 0])
         best = _Arrival(np.zeros_like(points), np.zeros_like(points), np.zeros(len(points), int))
         for candidate in range(CANDIDATES):
             u = sample_r3(keys, np.asarray(index) * CANDIDATES + candidate).astype(float)
-            arrival = self._arrival(self.sample(u), points, normals, role)
+            arrival = self._arrival(self.sample(u), points, normals, role, coupling)
             taken = choice.takes(arrival.irradiance.sum(axis=1))
             for name in ("irradiance", "point", "group"):
                 getattr(best, name)[taken] = getattr(arrival, name)[taken]
@@ -150,7 +167,9 @@ class ReferenceEmitters:
         result[lit] = best.irradiance[lit] * (choice.total[lit] / (choice.weight[lit] * CANDIDATES))[:, None] * tint
         return result
 
-    def by_directions(self, origins: np.ndarray, normals: np.ndarray, keys: np.ndarray, index, role) -> np.ndarray:
+    def by_directions(
+        self, origins: np.ndarray, normals: np.ndarray, keys: np.ndarray, index, role, coupling=None
+    ) -> np.ndarray:
         """(N, 3) irradiance by one direction about each of ``normals`` (N, 3), which finds emitters within
         ``reach``."""
         u = sample_r2(shifted(keys, 0, _DIRECTION_STREAM, 0), index).astype(float)
@@ -163,17 +182,20 @@ class ReferenceEmitters:
         edge = self.scene.triangles[triangle, 1:] - self.scene.triangles[triangle, :1]
         normal = np.cross(edge[:, 0], edge[:, 1])
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        cosine = np.einsum("ni,ni->n", direction, normals[found])
         share = self._point_share(
             self._group(triangle),
             self.density[triangle],
             hits.distance[found],
-            np.einsum("ni,ni->n", direction, normals[found]),
+            cosine,
             np.abs(np.einsum("ni,ni->n", direction, normal)),
         )
         result = np.zeros_like(origins)
         radiance = self.scene.emission(triangle, hits.barycentric[found])
         tint = self.scene.tint(origins[found], direction, hits.distance[found], DIFFUSE_RAYS)
         result[found] = radiance * ((1.0 - share) * np.pi)[:, None] * tint
+        if coupling is not None:
+            result[found] *= coupled(coupling[found], cosine)
         return result
 
     # At probes

@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 
 from . import direct_light
+from .faint_gloss import coupled
 from .patches import ALL, Part, lamps_a_ray
 from .reference_scene import ReferenceScene
 from .sampling import WeightedChoice, light_keys, sample_r2, sample_r3
@@ -30,12 +31,13 @@ class ReferenceLamps:
     def count(self) -> int:
         return len(self.all())
 
-    def irradiance(self, points, origins, normals, keys, index, role, part: Part = ALL) -> np.ndarray:
+    def irradiance(self, points, origins, normals, keys, index, role, coupling, part: Part = ALL) -> np.ndarray:
         """(C, 3) irradiance by ``part`` of the lamps at ``points`` (C, 3), of sample ``index`` of the sequences of
-        ``keys`` (C, 3), on surfaces of ``role`` (C,) with ``normals`` (C, 3). Rays start at ``origins`` (C, 3)."""
+        ``keys`` (C, 3), on surfaces of ``role`` (C,) with ``normals`` (C, 3) that take light by their ``coupling``
+        (C, 4). Rays start at ``origins`` (C, 3)."""
         total = np.zeros_like(points)
         for some in self._sharing_rays(part):
-            total += self._by_one_ray(some, points, origins, normals, keys, index, role)
+            total += self._by_one_ray(some, points, origins, normals, keys, index, role, coupling)
         return total
 
     def unshadowed(self, points, normals, keys, index, role, part: Part = ALL) -> np.ndarray:
@@ -52,7 +54,7 @@ class ReferenceLamps:
         first, stop = part if isinstance(part, tuple) else (0, self.count)
         return [range(at, min(at + each, stop)) for at in range(first, stop, each)]
 
-    def _by_one_ray(self, some: range, points, origins, normals, keys, index, role) -> np.ndarray:
+    def _by_one_ray(self, some: range, points, origins, normals, keys, index, role, coupling) -> np.ndarray:
         """Of ``some`` lamps, one ray to one of them, chosen by what each sends if nothing stands between (Talbot, Cline
         and Egbert, "Importance Resampling for Global Illumination", EGSR 2005, with every lamp a candidate)."""
         u = _numbers(some, keys, index)
@@ -61,6 +63,7 @@ class ReferenceLamps:
         samples = {number: self._sample(number, points, u) for number in some}
         for number, sample in samples.items():
             sent = self._unshadowed(self.all()[number], sample, normals, role)
+            sent *= coupled(coupling, np.einsum("ni,ni->n", sample.directions, normals))
             taken = choice.takes(np.abs(sent).sum(axis=1))
             chosen[taken], best[taken] = number, sent[taken]
         for number in np.unique(chosen[chosen >= 0]):

@@ -16,6 +16,7 @@ import numpy as np
 from .conventions import LUMINANCE
 from .cubemap import direction_to_texel
 from .emitters import CANDIDATES, sampling_density
+from .faint_gloss import coupled
 from .gloss import MOST_REFLECTIONS, PATCH_BLUR
 from .grid import Grid
 from .patches import (
@@ -177,7 +178,7 @@ class ReferenceLight:
         total = np.zeros((len(numbers), 3))
         each = points.shape[1]
         shift = (pcg3d(shifted(keys, 0, _PLACE_STREAM, 0))[:, 0] % each).astype(int)
-        roles = self._roles(numbers, sheets)
+        roles, coupling = self._roles(numbers, sheets), self.scene.couplings(*split(points[numbers, 0]))
         for index in range(samples):
             place = (index * each + shift) // samples if samples < each else index % each
             point, normal = split(points[numbers, place])
@@ -185,7 +186,7 @@ class ReferenceLight:
                 emitter_keys = shifted(side_keys, 0, 0, _EMITTER_STREAM)
                 origin = leave_surface(point[side], normals)
                 total[side] += share * self._irradiance(
-                    point[side], origin, normals, side_keys, emitter_keys, index, roles[side], part
+                    point[side], origin, normals, side_keys, emitter_keys, index, roles[side], coupling[side], part
                 )
         return total / samples
 
@@ -204,12 +205,14 @@ class ReferenceLight:
         """(C,) roles of the patches ``numbers`` (C,) in light linking."""
         return np.zeros(len(numbers), int) if sheets is None else self.scene.sheet_roles[sheets[numbers]]
 
-    def _irradiance(self, point, origin, normal, lamp_keys, emitter_keys, index, role, part: Part = ALL) -> np.ndarray:
+    def _irradiance(
+        self, point, origin, normal, lamp_keys, emitter_keys, index, role, coupling, part: Part = ALL
+    ) -> np.ndarray:
         irradiance = np.zeros_like(point)
         if part != EMITTERS:
-            irradiance += self._lamps.irradiance(point, origin, normal, lamp_keys, index, role, part)
+            irradiance += self._lamps.irradiance(point, origin, normal, lamp_keys, index, role, coupling, part)
         if self.emitters.count and part in (EMITTERS, ALL):
-            irradiance += self.emitters.irradiance(point, origin, normal, emitter_keys, index, role)
+            irradiance += self.emitters.irradiance(point, origin, normal, emitter_keys, index, role, coupling)
         return irradiance
 
     # Rays
@@ -239,10 +242,12 @@ class ReferenceLight:
         role = self._roles(patch, sheets)
         carried, reflected = np.zeros((len(patch), 3)), side_weight(through, crosses)
         reflected[at[:, 3] < 0] = 0.0
+        coupling = self.scene.couplings(*split(points[patch, 0]))
         for segment in range(segments):
             alive = np.flatnonzero(reflected.any(axis=1))
             u = sample_r2(shifted(keys[alive], 0, segment, 0), index[alive]).astype(float)
             direction = sample_cosine(normal[alive], u)
+            reflected[alive] *= coupled(coupling[alive], np.einsum("ni,ni->n", normal[alive], direction))
             found = self.scene.closest(origin[alive], direction)
             surface = self.scene.resolve(found, direction, _RAY_SPREAD)
             missed = found.triangle < 0
@@ -268,14 +273,15 @@ class ReferenceLight:
                 on = reflected[alive].any(axis=1)
                 alive, facing = alive[on], surface.normal[on]
                 here = shifted(keys[alive], 0, _PATH_LIGHT_STREAM + segment, 0)
-                arriving = np.zeros((len(alive), 3))
+                arriving, coupling[alive] = np.zeros((len(alive), 3)), self.scene.couplings(position[on], facing)
                 for side, normals, side_keys, share in self._sides(facing, here, np.arange(len(alive)), sheet[on]):
                     towards = np.where((normals * facing[side]).sum(axis=1, keepdims=True) > 0, -1, 1)
                     start = step_off(
                         position[on][side], normals, towards * direction[on][side], surface.distance[on][side]
                     )
+                    how = (values[alive][side] for values in (index, role, coupling))
                     arriving[side] += share * self._irradiance(
-                        position[on][side], start, normals, side_keys, side_keys, index[alive][side], role[alive][side]
+                        position[on][side], start, normals, side_keys, side_keys, *how
                     )
                 carried[alive] += reflected[alive] * arriving / np.pi
                 through = self.scene.sheet_shares[sheet[on]]

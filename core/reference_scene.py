@@ -12,10 +12,14 @@ import numpy as np
 
 from . import rays
 from .dithering import dither_threshold
+from .faint_gloss import albedo_towards, couplings, faint_rows
 from .images import sample_image
 from .light_links import link_roles
 from .sheets import sheet_numbers
 from .snapshot import DIFFUSE_RAYS, DITHERED, FROM_BEHIND, NO_IMAGE, SHADOW_RAYS, SceneSnapshot
+
+# How far below a point surface is looked for, of the step by which rays leave it.
+COUPLING_SEARCH = 32.0
 
 
 @dataclass
@@ -163,8 +167,32 @@ class ReferenceScene:
             for values, image in ((albedo, material.base_image), (emission, material.emission_image)):
                 if image != NO_IMAGE:
                     values *= sample_image(self.snapshot.images[image], uv[here], footprint[here])[:, :3]
+            if material.faint_gloss is not None:
+                rows = np.repeat(faint_rows([material.faint_gloss]), len(here), axis=0)
+                cosine = -np.einsum("ni,ni->n", surfaces.normal[hit[here]], direction[here])
+                albedo = albedo_towards(rows, albedo, cosine)
             surfaces.albedo[hit[here]], surfaces.emission[hit[here]] = albedo, emission
         return surfaces
+
+    def couplings(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """(N, 4) how surfaces right below ``points`` take light of grazing angles, see core/faint_gloss.py."""
+        result = np.tile([0.0, 0.0, 0.0, 1.0], (len(points), 1))
+        faint = [material.faint_gloss for material in self.snapshot.materials]
+        if not any(faint):
+            return result
+        origins = rays.leave_surface(points, normals)
+        hits = self.closest(origins, -normals)
+        reach = COUPLING_SEARCH * np.linalg.norm(origins - points, axis=1)
+        below = np.flatnonzero((hits.triangle >= 0) & (hits.distance < reach))
+        number = self.snapshot.material_index[hits.triangle[below]]
+        for index, material in enumerate(self.snapshot.materials):
+            here = below[number == index]
+            albedo = np.tile(np.array(material.base_color, float) * material.diffuse_share, (len(here), 1))
+            if material.base_image != NO_IMAGE:
+                albedo *= self._image(material.base_image, hits.triangle[here], hits.barycentric[here])[:, :3]
+            if material.faint_gloss is not None:
+                result[here] = couplings(np.repeat(faint_rows([material.faint_gloss]), len(here), axis=0), albedo)
+        return result
 
     def _uv_per_metre(self) -> np.ndarray:
         """(T,) square root of a triangle's area in uv over its area in the world."""

@@ -289,7 +289,7 @@ def _material_aspects(materials: list[Material], images: list[int] | None) -> li
 
     return [
         {
-            "reflectance": (*(c * m.diffuse_share for c in m.base_color), image(m.base_image), m.gloss),
+            "reflectance": (*(c * m.diffuse_share for c in m.base_color), image(m.base_image), m.gloss, m.faint_gloss),
             "emission": (*m.emission, image(m.emission_image)),
             "holes": (m.alpha, m.alpha_threshold, image(m.alpha_image), m.alpha_from_color)
             if m.alpha_threshold > 0

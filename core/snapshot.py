@@ -45,7 +45,7 @@ class Material:
     radiance. A texel with alpha below ``alpha_threshold`` is a hole (0: no clip; DITHERED: with the chance 1 − alpha,
     see ``core.dithering``). Of the part that is sent back the share ``transmitted``, per channel, leaves on the other
     side than that where the light arrived (see ``core.sheets``); of the part of a material with ``gloss`` a share is
-    mirrored (see ``core.gloss``).
+    mirrored (see ``core.gloss``); ``faint_gloss`` instead is sent in all directions (see ``core.faint_gloss``).
     """
 
     name: str
@@ -62,6 +62,7 @@ class Material:
     tint_image: int = NO_IMAGE
     transmitted: tuple[float, float, float] = (0.0, 0.0, 0.0)
     gloss: Gloss | None = None
+    faint_gloss: Gloss | None = None
     unseen_by: int = 0  # sum of SHADOW_RAYS, DIFFUSE_RAYS and FROM_BEHIND: for these the surface is not there
     links: Links = UNLINKED  # which emitters' light falls on it, and passes it
     backface_culling: bool = False  # stated only; light transport treats every surface as two-sided, like Cycles

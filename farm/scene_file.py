@@ -102,8 +102,8 @@ def _plain(value):
 
 
 def _material(values: dict) -> Material:
-    gloss = values["gloss"] and Gloss(**_tuples(values["gloss"]))
-    return Material(**_tuples({**values, "gloss": gloss, "links": Links(**values["links"])}))
+    lobes = {name: values[name] and Gloss(**_tuples(values[name])) for name in ("gloss", "faint_gloss")}
+    return Material(**_tuples({**values, **lobes, "links": Links(**values["links"])}))
 
 
 def _light(values: dict) -> Light:

@@ -42,6 +42,8 @@ def _scene(info, defines: dict, first: int = 0, attributes: bool = True) -> int:
         names += ["triangle_attributes", "materials"]
         if "HAS_IMAGES" in defines:
             names += ["image_table", "image_texels"]
+        if "HAS_FAINT_GLOSS" in defines:
+            names.append("faint_gloss")
     if "HAS_TINT" in defines:
         names.append("tints")
     if "HAS_LINKS" in defines:
@@ -71,6 +73,15 @@ def _lookup(info, first: int) -> int:
 
 def _surface_files(defines: dict) -> list[str]:
     return ["surface_lib"] if "HAS_ALPHA" in defines else []
+
+
+def _couplings(info, defines: dict, first: int) -> int:
+    """How surfaces at places take light of grazing angles, where that is known."""
+    return _samplers(info, "couplings", first=first) if "HAS_COUPLING" in defines else first
+
+
+def _coupling_files(defines: dict) -> list[str]:
+    return ["coupling_lib"] if "HAS_COUPLING" in defines else []
 
 
 def image_mip_comp(info, defines):
@@ -294,13 +305,13 @@ def patch_direct_comp(info, defines):
     slot = _scene(info, defines, attributes="HAS_EMITTERS" in defines)
     slot = _emitters(info, defines, slot)
     slot = _samplers(info, "lights", "patches", "patch_points", first=slot)
-    _sheets(info, defines, slot, "sheet_numbers")
+    _couplings(info, defines, _sheets(info, defines, slot, "sheet_numbers"))
     _image(info, 0, "sums")
     _patch_lists(info)
     _ints(info, "first_key", "seed")
     _part_of_light(info, defines)
     info.local_group_size(64, 1, 1)
-    files = ["data_lib", "octahedral_lib", *_light_files(defines), *_sheet_files(defines)]
+    files = ["data_lib", "octahedral_lib", *_coupling_files(defines), *_light_files(defines), *_sheet_files(defines)]
     return {"compute": [*files, "patch_lists_lib", "patch_direct_comp"]}
 
 

@@ -89,9 +89,7 @@ class GlossPass:
 
     def _tracer(self, textures: dict, found: _Found):
         scene = self._scene
-        defines = scene.surface_defines | scene.light_defines | scene.sheet_defines | scene.gloss_defines
-        defines |= {"HAS_IMAGES": scene.has_images}
-        shader = program("texel_reflections_comp", FACE=self._face, **defines)
+        shader = program("texel_reflections_comp", FACE=self._face, **scene.path_defines)
         scene.bind_surfaces(shader)
         scene.bind_sheets(shader)
         scene.bind_gloss(shader, lights=True)

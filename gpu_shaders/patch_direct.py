@@ -232,8 +232,10 @@ class PatchDirect:
             return
         threads = sum(count * -(-samples // samples_each) for _first, count, samples in lists)
         sums = self.scratch("sums", threads, "samples")
-        shader = program("patch_direct_comp", POINTS=places.each, **self._defines(part))
+        defines = self._defines(part) | places.defines
+        shader = program("patch_direct_comp", POINTS=places.each, **defines)
         self._bind(shader, part, places)
+        places.bind_couplings(shader)
         shader.image("sums", sums)
         shader.uniform_int("first_key", (first_key,))
         shader.uniform_int("seed", (self._settings.seed,))

@@ -21,7 +21,7 @@ from ..core.grid import Grid
 from ..core.patches import MOST_ROUNDS, NO_PATCH, NOTHING, POINTS, VARIANTS, CellRule, coarser_by
 from .dispatch import COMPACTION_BLOCK, dispatch_linear
 from .growing_array import GrowingArray, fill_elements
-from .places import Places
+from .places import Places, find_couplings
 from .programs import program
 from .scene_textures import SceneTextures
 from .textures import allocate_integers, numbers, read, scratch, upload
@@ -45,6 +45,7 @@ class PatchFinder:
         self._points = GrowingArray("patches")
         self._seen = GrowingArray("patches", "R32F", fill=0)
         self._sheets = GrowingArray("patches", "R32F", fill=0)
+        self._couplings, self._coupled = GrowingArray("patches"), 0  # known of so many patches
         self._candidates = GrowingArray("patches", "R32UI", fill=_NOBODY)
         self._places = 0
         self._totals = [gpu.types.GPUTexture((1, 1), format="R32F") for _ in range(2)]
@@ -59,7 +60,20 @@ class PatchFinder:
     @property
     def places(self) -> Places:
         """The points with what lighting them asks for."""
-        return Places(self.points, POINTS, self._sheets.texture if self._scene.has_sheets else None)
+        sheets = self._sheets.texture if self._scene.has_sheets else None
+        return Places(self.points, POINTS, sheets, self._known_couplings() if self._scene.has_faint_gloss else None)
+
+    def _known_couplings(self) -> gpu.types.GPUTexture:
+        """Couplings of all patches, those found now that are not known yet."""
+        target = self._couplings.reserve(self.count)
+        if self._coupled < self.count:
+            find_couplings(self._scene, self.points, POINTS, self._coupled, self.count - self._coupled, target)
+            self._coupled = self.count
+        return target
+
+    def forget_couplings(self) -> None:
+        """Materials are others than before."""
+        self._coupled = 0
 
     @property
     def seen(self) -> gpu.types.GPUTexture:

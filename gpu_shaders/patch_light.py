@@ -8,7 +8,7 @@ geometry alone (points, ends of rays, what they reflect) stays where it is when 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import gpu
 import numpy as np
@@ -22,7 +22,7 @@ from .dispatch import dispatch_linear
 from .growing_array import GrowingArray, copy_elements
 from .patch_direct import PatchDirect, reduce_patches
 from .patch_finder import PatchFinder
-from .places import Places
+from .places import Places, find_couplings
 from .programs import program
 from .scene_textures import SceneTextures
 from .textures import allocate, numbers, read, scratch, upload
@@ -205,10 +205,9 @@ class PatchLight:
     def _bind_ray_scene(self, rays: Rays):
         """The shader that traces ``rays``, with what it reads of the scene bound: lamps only where rays are lit."""
         scene, is_path = self._scene, rays.segments > 1
-        defines = scene.surface_defines | scene.sheet_defines | scene.gloss_defines
-        if is_path or scene.has_gloss:
-            defines = defines | scene.light_defines
-        defines = defines | {"HAS_IMAGES": scene.has_images}
+        is_lit = is_path or scene.has_gloss
+        defines = scene.path_defines if is_lit else scene.surface_defines | scene.sheet_defines
+        defines = defines | rays.places.defines
         shader = program(
             "patch_rays_comp", FACE=self._settings.face, POINTS=rays.places.each, SEGMENTS=rays.segments, **defines
         )
@@ -217,6 +216,7 @@ class PatchLight:
             scene.bind_lights(shader)
         scene.bind_gloss(shader, lights=not is_path)
         scene.bind_sheets(shader, rays.places.sheets)
+        rays.places.bind_couplings(shader)
         return shader
 
     # Bounces
@@ -328,6 +328,10 @@ class PatchLight:
         settings = self._settings
         rays_each = gather_rays(settings.samples)
         direct, result = allocate(count, "texels"), allocate(count, "texels")
+        if self._scene.has_faint_gloss:
+            couplings = allocate(count, "texels")
+            find_couplings(self._scene, texels.points, texels.each, 0, count, couplings)
+            texels = replace(texels, couplings=couplings)
         reflects = np.flatnonzero(read(texels.points, count)[:, 3] >= 0)
         chosen = numbers(reflects, "texels")
         run(self._direct.light(texels, chosen, [(0, len(reflects), settings.samples)], direct, first_key))

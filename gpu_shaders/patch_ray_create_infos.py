@@ -4,7 +4,19 @@
 from __future__ import annotations
 
 from ..core.patches import MOST_CAUGHT, NO_PATCH, NOTHING
-from .create_infos import _emitters, _image, _ints, _light_files, _samplers, _scene, _sheet_files, _sheets
+from ..core.reference_scene import COUPLING_SEARCH
+from .create_infos import (
+    _coupling_files,
+    _couplings,
+    _emitters,
+    _image,
+    _ints,
+    _light_files,
+    _samplers,
+    _scene,
+    _sheet_files,
+    _sheets,
+)
 from .gloss_create_infos import gloss, gloss_files
 
 
@@ -16,7 +28,7 @@ def patch_rays_comp(info, defines):
         _ints(info, "light_count")
         slot = _samplers(info, "lights", first=slot)
     slot = _samplers(info, "patch_points", "world_texels", first=slot)
-    slot = _sheets(info, defines, slot, "sheet_numbers")
+    slot = _couplings(info, defines, _sheets(info, defines, slot, "sheet_numbers"))
     gloss(info, defines, slot)
     _image(info, 0, "hits")
     _image(info, 1, "carried")
@@ -30,6 +42,7 @@ def patch_rays_comp(info, defines):
             "data_lib",
             "octahedral_lib",
             "cubemap_lib",
+            *_coupling_files(defines),
             *(
                 _light_files(defines | {"HAS_ALPHA": True})
                 if lights_points
@@ -40,6 +53,16 @@ def patch_rays_comp(info, defines):
             "patch_rays_comp",
         ]
     }
+
+
+def place_coupling_comp(info, defines):
+    info.define("SEARCH", repr(COUPLING_SEARCH))
+    _samplers(info, "patch_points", first=_scene(info, defines))
+    _image(info, 0, "couplings")
+    _ints(info, "first_place", "place_count")
+    info.local_group_size(64, 1, 1)
+    files = ["surface_lib", "offset_lib", "ray_lib", "place_coupling_comp"]
+    return {"compute": ["data_lib", "octahedral_lib", *files]}
 
 
 def patch_carried_comp(info, defines):

@@ -54,9 +54,9 @@ class ProbePaths:
 
     def _trace(self, first: int, count: int, bounces: int | None, seed: int) -> tuple[np.ndarray, np.ndarray]:
         scene, paths = self._scene, SETS * self.count * count
-        defines = scene.surface_defines | scene.light_defines | scene.sheet_defines | scene.gloss_defines
-        defines |= {"HAS_IMAGES": scene.has_images}
-        shader = program("probe_paths_comp", FACE=_FACE, **defines)
+        shader = program(
+            "probe_paths_comp", FACE=_FACE, **(scene.path_defines | {"HAS_COUPLING": scene.has_faint_gloss})
+        )
         directions, flux = (allocate(_PARTS * paths, "paths") for _ in range(2))
         scene.bind_surfaces(shader)
         scene.bind_lights(shader)

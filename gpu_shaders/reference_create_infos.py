@@ -3,7 +3,17 @@
 
 from __future__ import annotations
 
-from .create_infos import _emitters, _image, _ints, _light_files, _samplers, _scene, _sheet_files, _sheets
+from .create_infos import (
+    _coupling_files,
+    _emitters,
+    _image,
+    _ints,
+    _light_files,
+    _samplers,
+    _scene,
+    _sheet_files,
+    _sheets,
+)
 from .gloss_create_infos import gloss, gloss_files
 
 
@@ -20,4 +30,6 @@ def probe_paths_comp(info, defines):
     )
     info.local_group_size(64, 1, 1)
     files = [*_light_files(defines | {"HAS_ALPHA": True}), *gloss_files(defines), *_sheet_files(defines)]
-    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *files, "probe_paths_comp"]}
+    return {
+        "compute": ["data_lib", "octahedral_lib", "cubemap_lib", *_coupling_files(defines), *files, "probe_paths_comp"]
+    }

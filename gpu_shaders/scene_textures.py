@@ -12,6 +12,7 @@ import numpy as np
 
 from ..core import bvh, emitters
 from ..core.errors import InputError
+from ..core.faint_gloss import faint_rows
 from ..core.gloss import gloss_rows
 from ..core.light_links import link_roles
 from ..core.scene_changes import SceneChanges, ShapeChange, boxes_around
@@ -24,6 +25,7 @@ from .scatter import scatter_rows
 from .textures import upload
 
 _STACK_STEP = 8  # sizes of traversal stacks are multiples of it, so that most edits of a scene need no new shaders
+_OF_MATERIALS = "materials", "sheets", "links", "tints", "gloss_rows", "faint_gloss", "emitters"
 _MOST_TRIANGLES = 1 << 24  # their numbers are kept as float32, which knows every whole number up to here
 
 
@@ -148,7 +150,7 @@ class SceneTextures:
         """Materials, sheets, emitters, and corners and attributes of all triangles or of those at ``only`` (K,) in leaf
         order."""
         for name, values in self._surface_rows(snapshot, density, slice(None) if only is None else only).items():
-            if only is None or name in ("materials", "sheets", "links", "tints", "gloss_rows", "emitters"):
+            if only is None or name in _OF_MATERIALS:
                 self._textures[name] = upload(values, name.replace("_", " "))
             elif len(only):
                 scatter_rows(self._textures[name], only, values)
@@ -165,6 +167,7 @@ class SceneTextures:
         sheet_of_material, sheets = sheet_numbers(snapshot.materials, self._links.of_surface)
         self.has_sheets = len(sheets) > 1
         self.has_gloss = any(material.gloss is not None for material in snapshot.materials)
+        self.has_faint_gloss = any(material.faint_gloss is not None for material in snapshot.materials)
         self._density = density[order]
         self.emitter_count = int(np.count_nonzero(self._density))
         self.emitter_reach = emitters.reach(self._density)
@@ -183,6 +186,7 @@ class SceneTextures:
             "links": self._links.rows(),
             "tints": _tints(snapshot),
             "gloss_rows": gloss_rows([material.gloss for material in snapshot.materials]),
+            "faint_gloss": faint_rows([material.faint_gloss for material in snapshot.materials]),
             "emitters": _emitters(self._density, self.corners, order),
             "triangle_corners": rows,
             "triangle_attributes": _attributes(snapshot, order[at], material, corners, self._density[at]),
@@ -200,6 +204,7 @@ class SceneTextures:
         return {
             "HAS_ALPHA": self.has_alpha,
             "HAS_IMAGES": self.has_images,
+            "HAS_FAINT_GLOSS": self.has_faint_gloss,
             "HAS_UNSEEN": self.has_unseen,
             "HAS_PROFILES": any(profile is not None for profile in self._profiles),
             "HAS_TINT": self.has_tint,
@@ -212,7 +217,7 @@ class SceneTextures:
     @property
     def ray_defines(self) -> dict:
         """For shaders that only trace rays; images matter to them only where surfaces have holes."""
-        return self.surface_defines | {"HAS_IMAGES": self.has_alpha and self.has_images}
+        return self.surface_defines | {"HAS_IMAGES": self.has_alpha and self.has_images, "HAS_FAINT_GLOSS": False}
 
     @property
     def light_defines(self) -> dict:
@@ -224,6 +229,11 @@ class SceneTextures:
     def sheet_defines(self) -> dict:
         """For shaders that light patches or find them."""
         return {"HAS_SHEETS": self.has_sheets}
+
+    @property
+    def path_defines(self) -> dict:
+        """For shaders that follow light from surface to surface and light points there."""
+        return self.light_defines | self.surface_defines | self.sheet_defines | self.gloss_defines
 
     @property
     def gloss_defines(self) -> dict:
@@ -304,6 +314,8 @@ class SceneTextures:
             self.bind(shader, "links")
         if self.has_images:
             self.bind(shader, "image_table", "image_texels")
+        if self.has_faint_gloss:
+            self.bind(shader, "faint_gloss")
 
 
 def _attributes(

@@ -29,10 +29,14 @@ class Mirrored:
         """The same facets with another ``color``."""
         return replace(self, color=color)
 
-    def gloss(self, sent_back: Value) -> Gloss | None:
-        """It as a part of all that is ``sent_back``; None where that makes too little of a difference."""
+    def is_faint(self, sent_back: Value) -> bool:
+        """Whether of all that is ``sent_back`` it makes too little of a difference to be followed."""
         light, all_ = self.color.number(), max(sent_back.number(), 1e-9)
-        if light * (1 - self.roughness) * (light / all_) ** 0.5 < LEAST_GLOSS:
+        return light * (1 - self.roughness) * (light / all_) ** 0.5 < LEAST_GLOSS
+
+    def gloss(self, sent_back: Value) -> Gloss | None:
+        """It as a part of all that is ``sent_back``; None where nothing is mirrored."""
+        if self.color.is_zero():
             return None
         fixed = self.color.is_constant
         share = self.color.rgb() if fixed else self.color.rgb() / np.maximum(sent_back.rgb(), 1e-9)

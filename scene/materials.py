@@ -180,7 +180,7 @@ class MaterialTable:
                 tint=_color(tint),
                 tint_image=NO_IMAGE if tint.is_constant else self._add(f"{name} tint", tint, None),
                 transmitted=transmitted,
-                gloss=self._gloss(name, closure, sent_back, any(transmitted)),
+                **self._gloss(name, closure, sent_back, any(transmitted)),
                 unseen_by=FROM_BEHIND if closure.one_sided else 0,
                 backface_culling=backface_culling,
             )
@@ -201,12 +201,13 @@ class MaterialTable:
         mean = np.maximum(np.broadcast_to(whole.mean(), 3), 1e-9)
         return whole, _three(np.clip(np.broadcast_to(closure.through.mean(), 3) / mean, 0.0, 1.0))
 
-    def _gloss(self, name: str, closure: Closure, sent_back: Value, lets_through: bool) -> Gloss | None:
-        gloss = closure.mirrored.gloss(sent_back)
-        if gloss is not None and lets_through:
-            self._notices.group("gloss of translucent materials is sent in all directions", name)
-            return None
-        return gloss
+    def _gloss(self, name: str, closure: Closure, sent_back: Value, lets_through: bool) -> dict[str, Gloss | None]:
+        gloss, is_faint = closure.mirrored.gloss(sent_back), closure.mirrored.is_faint(sent_back)
+        if lets_through:
+            if not is_faint:
+                self._notices.group("gloss of translucent materials is sent in all directions", name)
+            return {}
+        return {"faint_gloss" if is_faint else "gloss": gloss}
 
     def _in_domain(self, name: str, role: str, value: Value, domain: Domain) -> Value:
         """``value`` as it can be sampled with the material's one mapping: textures that lie elsewhere become their

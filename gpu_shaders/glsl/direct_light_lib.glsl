@@ -167,7 +167,12 @@ vec3 unshadowed_irradiance(int light, LightSample light_sample, vec3 normal)
     return vec3(0.0);
   }
 #endif
-  return light_sample.irradiance * max(dot(light_sample.direction, normal), 0.0);
+  float cosine = max(dot(light_sample.direction, normal), 0.0);
+#ifdef HAS_COUPLING
+  return light_sample.irradiance * cosine * coupled(cosine);
+#else
+  return light_sample.irradiance * cosine;
+#endif
 }
 
 /* The share of it that arrives, by a shadow ray. */

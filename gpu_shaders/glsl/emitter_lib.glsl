@@ -107,6 +107,9 @@ vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, 
     float emitter_cosine = abs(dot(direction, emitter.normal));
     vec3 irradiance = emitter.radiance * (surface_cosine * emitter_cosine / (squared * emitter.density) *
                                           point_share(emitter.group, emitter.density, distance, surface_cosine, emitter_cosine));
+#ifdef HAS_COUPLING
+    irradiance *= coupled(surface_cosine);
+#endif
     float weight = irradiance.r + irradiance.g + irradiance.b;
     if (takes(weight, choice, total)) {
       best_irradiance = irradiance;
@@ -163,8 +166,11 @@ vec3 emitter_direction_irradiance(vec3 origin, vec3 normal, uvec3 key, int index
   vec3 across = cross(element(triangle_corners, 3 * hit.triangle + 1).xyz - a,
                       element(triangle_corners, 3 * hit.triangle + 2).xyz - a);
   float share = point_share(group, density, hit.distance, dot(direction, normal), abs(dot(direction, normalize(across))));
-  return emitter_radiance(hit.triangle, hit.barycentric) * ((1.0 - share) * 3.141592653589793) *
-         passed_to(origin, direction, hit.distance);
+  vec3 arriving = passed_to(origin, direction, hit.distance);
+#ifdef HAS_COUPLING
+  arriving *= coupled(dot(direction, normal));
+#endif
+  return emitter_radiance(hit.triangle, hit.barycentric) * ((1.0 - share) * 3.141592653589793) * arriving;
 }
 
 /* Irradiance of all sampled emitters at a surface: sample `index` of the sequences of `key`. */

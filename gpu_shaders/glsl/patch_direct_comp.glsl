@@ -5,6 +5,7 @@
  * Fewer samples than points take one of each equal run of points, all the same one of their runs, which is random.
  * The key of a number is (first_key + patch, light, seed); its index counts samples, so the points of a patch share one stratified sequence.
  * patch_points, POINTS elements a patch: position, packed normal. patches: index of a patch in x. sheet_numbers: of each patch.
+ * couplings: of each patch, see coupling_lib.
  */
 
 vec3 irradiance_of_side(vec3 point, vec3 normal, uvec3 key, int index)
@@ -33,6 +34,9 @@ void main()
   uvec3 key = uvec3(uint(first_key + patch_index), 0u, uint(seed));
   int shift = int(pcg3d(key + uvec3(0u, 0x85EBCA6Bu, 0u)).x % uint(POINTS));
   vec3 irradiance = vec3(0.0);
+#ifdef HAS_COUPLING
+  coupling = element(couplings, patch_index);
+#endif
 #ifdef HAS_LINKS
   lit_role = role_of_sheet(int(element(sheet_numbers, patch_index).x));
 #endif

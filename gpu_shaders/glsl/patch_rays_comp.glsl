@@ -42,12 +42,18 @@ void main()
 #ifdef HAS_LINKS
   lit_role = role_of_sheet(own_sheet);
 #endif
+#ifdef HAS_COUPLING
+  coupling = element(couplings, patch_index);
+#endif
   vec3 origin = leave_surface(at.xyz, normal);
   uvec3 key = uvec3(uint(first_key + patch_index), 0x85EBCA6Bu, uint(seed));
   vec4 end = vec4(0.0, 0.0, 0.0, -1.0);
   throughput = at.w < 0.0 ? vec3(0.0) : throughput; /* a texel that reflects nothing */
   for (int segment = 0; segment < SEGMENTS && throughput != vec3(0.0); segment++) {
     vec3 direction = sample_cosine(normal, sample_r2(key + uvec3(0u, uint(segment), 0u), number));
+#ifdef HAS_COUPLING
+    throughput *= coupled(dot(normal, direction));
+#endif
     Hit hit = trace_closest(origin, direction);
     throughput *= passed_to(origin, direction, hit.distance);
     if (hit.triangle < 0) {
@@ -85,6 +91,9 @@ void main()
 #if SEGMENTS > 1
     if (segment < SEGMENTS - 1) {
       normal = surface.normal;
+#ifdef HAS_COUPLING
+      coupling = surface.coupling;
+#endif
       origin = step_off(surface.position, normal, -direction, hit.distance);
       uvec3 light_key = key + uvec3(0u, 0x1B873593u + uint(segment), 0u);
       vec3 irradiance = irradiance_at(surface.position, origin, normal, light_key, number);

@@ -119,6 +119,9 @@ void main()
     }
     vec3 normal = surface.normal;
     float side = 1.0;
+#ifdef HAS_COUPLING
+    coupling = surface.coupling;
+#endif
 #ifdef HAS_SHEETS /* which side light is looked for on is chosen by its share */
     vec3 through = share_of_back(sheet_of_triangle(hit.triangle));
     float chance = dot(through, vec3(1.0 / 3.0));
@@ -134,6 +137,9 @@ void main()
 #endif
     radiance += throughput * irradiance * 0.3183098861837907;
     direction = sample_cosine(normal, random_pair(segment_key + uvec3(2u, 0u, 0u)));
+#ifdef HAS_COUPLING
+    throughput *= coupled(dot(normal, direction));
+#endif
   }
   store(entry, 0, first, behind, radiance * SPHERE);
 }

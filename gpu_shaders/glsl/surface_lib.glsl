@@ -5,6 +5,7 @@
  *     uv2, the density with which the triangle is sampled as an emitter (core/emitters.py), its number in the snapshot
  *   materials, 3 elements: diffuse albedo, base image | emission, emission image | alpha, threshold, alpha image, alpha from colour
  *   tints, 1 element a material: what its holes leave of light, image
+ *   faint_gloss, 2 elements a material: see core/faint_gloss.py
  *   image_table, 1 element: first row in image_texels, width, height, extension
  *   image_texels: linear RGBA, mip levels of an image one after the other
  */
@@ -112,10 +113,31 @@ struct Surface {
   vec3 normal; /* shading normal, on the viewer's side */
   bool back;   /* seen from behind */
   int object;
-  vec3 albedo;
+  vec3 albedo; /* towards the viewer */
   vec3 emission;
   float emitter_density; /* per m²; 0 where rays find the emission by themselves */
+#ifdef HAS_FAINT_GLOSS
+  vec4 coupling; /* see coupling_lib */
+#endif
 };
+
+#ifdef HAS_FAINT_GLOSS
+/* What a surface with gloss that is not followed sends to a view at `cosine`, and how it takes light. */
+void send_faint_gloss(inout Surface surface, int material, float cosine)
+{
+  surface.coupling = vec4(0.0, 0.0, 0.0, 1.0);
+  vec4 share = element(faint_gloss, 2 * material);
+  if (share.rgb == vec3(0.0)) {
+    return;
+  }
+  vec4 slope = element(faint_gloss, 2 * material + 1);
+  vec3 whole = slope.w != 0.0 ? min(share.rgb, surface.albedo) : surface.albedo * share.rgb;
+  float grazing = pow(clamp(1.0 - cosine, 0.0, 1.0), share.w) - 2.0 / ((share.w + 1.0) * (share.w + 2.0));
+  vec3 mirrored = min(whole * (1.0 + slope.rgb * grazing), vec3(1.0));
+  surface.coupling = vec4(slope.rgb * whole / max(surface.albedo, vec3(1.0e-9)), share.w);
+  surface.albedo = mirrored + (surface.albedo - whole) * (1.0 - mirrored) / max(1.0 - whole, vec3(1.0e-3));
+}
+#endif
 
 /* Where a ray meets a triangle's plane, near the `interpolated` hit. Interpolation is off by the rounding of the corners, centimetres on a
  * ground plane of kilometres; the plane is as exact as its nearest corner, and exact where it is parallel to two axes. */
@@ -175,6 +197,9 @@ Surface resolve_surface(int triangle, vec2 barycentric, vec3 origin, vec3 direct
       surface.emission *= sample_image(int(emission.w), uv, footprint).rgb;
     }
   }
+#endif
+#ifdef HAS_FAINT_GLOSS
+  send_faint_gloss(surface, material, -dot(surface.normal, direction));
 #endif
   return surface;
 }
