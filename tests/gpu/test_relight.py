@@ -9,6 +9,7 @@ from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.block_session import open_session
 from gridlight.bake.job import drive
 from gridlight.bake.session import BakeSession
+from gridlight.core.gloss import Gloss
 from gridlight.core.grid import Grid
 from gridlight.core.settings import BakeSettings
 from gridlight.core.snapshot import Image, Light, Material, World
@@ -35,7 +36,7 @@ def rooms(**options):
     pixels[..., 3] = pixels[..., 0] > 0.4
     materials = [
         Material("wall", (0.7, 0.7, 0.7), base_image=0),
-        Material("partition", (0.6, 0.2, 0.2)),
+        Material("partition", (0.6, 0.2, 0.2), faint_gloss=Gloss((0.1, 0.1, 0.1), (0.04, 0.04, 0.04), 0.5, True)),
         Material("wood", (0.5, 0.4, 0.3)),
         Material("bulb", (0.1, 0.1, 0.1), emission=(20.0, 18.0, 15.0)),
         Material("leaf", (0.2, 0.7, 0.2), alpha_image=1, alpha_threshold=0.5),
@@ -141,6 +142,7 @@ NO_CAPTURE = {
     "no emission": lambda s: with_material(s, 3, emission=(0.0, 0.0, 0.0)),
     "emission of a wall": lambda s: with_material(s, 0, emission=(0.2, 0.1, 0.3)),
     "reflectance": lambda s: with_material(s, 1, base_color=(0.1, 0.2, 0.8)),
+    "gloss of all directions": lambda s: with_material(s, 1, faint_gloss=Gloss((0.2, 0.2, 0.2), (0.1, 0.1, 0.1), 0.6)),
     "a texture": lambda s: replace(
         s, images=[replace(s.images[0], pixels=s.images[0].pixels * np.float32([0.5, 1, 1, 1])), s.images[1]]
     ),
