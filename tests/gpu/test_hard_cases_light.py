@@ -8,6 +8,7 @@ import pytest
 from gridlight.core.errors import InputError
 from gridlight.core.grid import Grid
 from gridlight.core.panorama import panorama_directions, panorama_solid_angles, project_panorama
+from gridlight.core.patches import MOST_PARTS
 from gridlight.core.settings import BakeSettings
 from gridlight.core.snapshot import Light, Material, World
 from hard_rooms import GREY, HALF, LAMP, SMALL, bake_room, check_whole, difference, grid, light_at, points, room
@@ -100,6 +101,26 @@ def test_thousands_of_lamps_are_one(count):
     one, many = (bake_room(volume, settings, lights=lamps) for lamps in ([LAMP], [times(LAMP, 1 / count)] * count))
     check_whole(many)
     np.testing.assert_allclose(many.field.coefficients, one.field.coefficients, rtol=2e-3, atol=1e-4)
+
+
+def test_lamps_that_share_rays_are_the_sum_of_those_that_do_not():
+    """Six times MOST_PARTS lamps, in a room with something to cast shadows."""
+    generator, block = np.random.default_rng(1), box((-0.2, -0.3, -0.4), (0.2, 0.1, 0.3))
+    places = generator.uniform(-0.9, 0.9, (6 * MOST_PARTS, 3)) * HALF
+    lamps = [
+        Light(f"lamp {number}", "POINT", tuple(generator.uniform(0, 1, 3)), frame(place), radius=0.02)
+        for number, place in enumerate(places)
+    ]
+    together = bake_room(extra=[block], lights=lamps)
+    check_whole(together)
+    alone = [
+        light_at(bake_room(extra=[block], lights=lamps[first : first + MOST_PARTS]), points())
+        for first in range(0, len(lamps), MOST_PARTS)
+    ]
+    expected = np.sum(alone, axis=0)
+    error = light_at(together, points()) - expected
+    assert np.sqrt((error**2).mean()) < 0.02 * np.sqrt((expected**2).mean())
+    assert abs(error.mean()) < 0.005 * expected.mean()
 
 
 @pytest.mark.parametrize("count,grains", [(20, 8_000), pytest.param(50, 40_000, marks=pytest.mark.nightly)])
