@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from ..core import bvh
 from ..core.errors import GridlightError
 from ..core.grid import Grid
 from ..core.settings import BakeSettings
-from ..core.snapshot import SceneSnapshot
+from ..core.snapshot import Light, SceneSnapshot
 from ..gpu_shaders import programs
 from ..gpu_shaders.context import device_description, ensure_context
 from ..gpu_shaders.textures import wait_for_gpu
@@ -27,6 +28,7 @@ from .bench_measure_peers import median_row
 from .bench_phases import PhaseClock
 
 _INSET_M = 0.3
+_LAMPS_POWER = 60.0  # of all small lamps: radiant intensity, W/sr
 _MOST_RUNS, _REPEAT_SECONDS = 5, 1.0  # of each case, until one of the two is reached
 _GROWTH = 1.0  # exponent that the next size is expected to grow by at least
 
@@ -34,8 +36,8 @@ _GROWTH = 1.0  # exponent that the next size is expected to grow by at least
 def scaling(request: dict, reporter, should_stop) -> None:
     """Measures the sweeps of ``request`` size by size in turn, so that all of them have come as far when time is up.
 
-    A sweep: {"name", "parameter": "probes" | "triangles" | "face", "capture", "sizes"}; the other two parameters are
-    those of ``request["base"]``.
+    A sweep: {"name", "parameter": "probes" | "triangles" | "face" | "lamps", "capture", "sizes"}; the other parameters
+    are those of ``request["base"]``.
     """
     deadline = time.perf_counter() + request["seconds"]
     reporter.phase("GPU context")
@@ -138,8 +140,9 @@ class _Bakes:
         settings = BakeSettings(**{**self._settings, "face": case["face"], "capture": capture, "keep_all": True})
         clock = PhaseClock()
         bvh.forget()
+        snapshot = with_lamps(self._snapshot, case["lamps"])
         started = time.perf_counter()
-        session = BakeSession(BakeJob(self._snapshot, grid, settings), clock, stopwatch=clock)
+        session = BakeSession(BakeJob(snapshot, grid, settings), clock, stopwatch=clock)
         drive(session.bake(), self._should_stop)
         result = session.result
         seconds = time.perf_counter() - started
@@ -150,6 +153,7 @@ class _Bakes:
             "probes": grid.count,
             "triangles": len(self._snapshot.triangles),
             "face": case["face"],
+            "lamps": len(snapshot.lights),
             "capture": result.capture,
             "patches": session.backend.light.count,
             "iterations": result.iterations,
@@ -169,6 +173,19 @@ class _Bakes:
             backend.capture(surfaces, session.result.capture)
         wait_for_gpu()
         return time.perf_counter() - started
+
+
+def with_lamps(snapshot: SceneSnapshot, count: int) -> SceneSnapshot:
+    """The hall with ``count`` small lamps all over it, which share _LAMPS_POWER; as it is where it has as many."""
+    if count == len(snapshot.lights):
+        return snapshot
+    places = np.random.default_rng(0).uniform(_INSET_M, HALL_SIZE_M - _INSET_M, (count, 3))
+    lamps = []
+    for number, place in enumerate(places):
+        matrix = np.eye(4)
+        matrix[:3, 3] = place
+        lamps.append(Light(f"lamp {number}", "POINT", (_LAMPS_POWER / count,) * 3, matrix, radius=0.03))
+    return replace(snapshot, lights=lamps)
 
 
 def resolution_for(probes: int) -> tuple[int, int, int]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``gridlight bench scaling``: how the cost of a bake grows with probes, triangles and texels, phase by phase."""
+"""``gridlight bench scaling``: how a bake's cost grows with probes, triangles, texels and lamps, phase by phase."""
 
 from __future__ import annotations
 
@@ -10,14 +10,16 @@ import numpy as np
 from . import bench_chart, bench_table
 from .bench_run import Run
 
-BASE = {"probes": 300, "triangles": 10_000, "face": 16}
+BASE = {"probes": 300, "triangles": 10_000, "face": 16, "lamps": 2}
 _PROBES = [30, 100, 300, 1000, 3000, 10_000, 30_000]
 _TRIANGLES = [1000, 3000, 10_000, 30_000, 100_000, 300_000, 1_000_000]
 _FACES = [8, 12, 16, 24, 32, 48, 64]
+_LAMPS = [2, 5, 16, 50, 150, 500, 1500]
 SWEEPS = (
     {"name": "triangles", "parameter": "triangles", "capture": "trace", "sizes": _TRIANGLES},
     {"name": "probes", "parameter": "probes", "capture": "trace", "sizes": _PROBES},
     {"name": "faces", "parameter": "face", "capture": "trace", "sizes": _FACES},
+    {"name": "lamps", "parameter": "lamps", "capture": "trace", "sizes": _LAMPS},
     {"name": "triangles, rasterised", "parameter": "triangles", "capture": "raster", "sizes": _TRIANGLES},
     {"name": "probes, rasterised", "parameter": "probes", "capture": "raster", "sizes": _PROBES},
     {"name": "faces, rasterised", "parameter": "face", "capture": "raster", "sizes": _FACES},
@@ -123,8 +125,8 @@ def table(summary: dict) -> list[str]:
     lines = ["Seconds, warm, median of up to five; the GPU is waited for after every phase. Every probe is kept."]
     base = summary["base"]
     lines.append(
-        f"What is not varied: {base['probes']} probes, {base['triangles']} triangles, faces of {base['face']}² texels; "
-        "a hall whose walls and balls are cut finer."
+        f"What is not varied: {base['probes']} probes, {base['triangles']} triangles, faces of {base['face']}² texels, "
+        f"{base['lamps']} lamps; a hall whose walls and balls are cut finer, or lit by small lamps."
     )
     lines.append("Exponent: of growth with the size, fitted to all sizes; 1 is in proportion.")
     cold = summary["cold"]
@@ -156,7 +158,7 @@ def _sweep_table(sweep: dict) -> list[str]:
         names = phases_of(rows)
         cells = [[sweep["parameter"], "patches", *names, "whole", "µs/probe", "capture again", "predicted"]]
         for row in rows:
-            size = {"probes": row["probes"], "triangles": row["triangles"], "face": row["face"]}[sweep["parameter"]]
+            size = row[sweep["parameter"]]
             seconds = [row["phases"].get(name, 0.0) for name in names]
             cells.append(
                 [
@@ -190,7 +192,7 @@ def _sweep_table(sweep: dict) -> list[str]:
 def plot(summary: dict) -> str:
     """Seconds over size, a line a sweep: whole bakes and captures alone."""
     panels = []
-    for parameter in ("triangles", "probes", "face"):
+    for parameter in ("triangles", "probes", "face", "lamps"):
         chart = bench_chart.Chart(f"{parameter}", parameter, "seconds")
         for sweep in summary["sweeps"]:
             if sweep["parameter"] != parameter or not sweep["rows"]:

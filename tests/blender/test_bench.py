@@ -137,9 +137,12 @@ def children(request):
 
 def test_scaling_reports_sizes_until_the_time_is_up():
     sweeps = [{"name": "triangles", "parameter": "triangles", "capture": "trace", "sizes": [1000, 4000, 1 << 50]}]
-    base = {"probes": 18, "triangles": 1000, "face": 4}
+    sweeps.append({"name": "lamps", "parameter": "lamps", "capture": "trace", "sizes": [40]})
+    base = {"probes": 18, "triangles": 1000, "face": 4, "lamps": 2}
     reports = children({"peer": "scaling", "seconds": 1e5, "base": base, "settings": {}, "sweeps": sweeps})
     rows = [report for report in reports if "run" in report]
+    assert [row["lamps"] for row in rows if row["run"] == "lamps"] == [40]
+    rows = [row for row in rows if row["run"] == "triangles"]
     assert [row["size"] for row in rows] == [1000, 4000]
     assert [round(row["triangles"], -3) for row in rows] == [1000, 4000]
     for row in rows:
