@@ -122,6 +122,30 @@ def plastic(scene, roughness, grey):
     panel(scene)
 
 
+def all_of_plastic(scene, grey):
+    """Everything of a Principled BSDF as Blender adds it, but for its colour."""
+    plain = principled("Plastic", Base_Color=(grey, grey, grey), Roughness=0.5)
+    shell(scene, PLAIN_M, **dict.fromkeys(SIDES, plain))
+    scenes.add_box(scene, "Box", (1.6, 1.7, 0), (2.3, 2.4, 1.1), plain)
+    panel(scene)
+
+
+def coloured_plastic(scene):
+    def plain(name, color):
+        return principled(name, Base_Color=color, Roughness=0.5)
+
+    sides = {
+        "floor": plain("Floor", (0.25, 0.15, 0.08)),
+        "left": plain("Red", (0.6, 0.05, 0.05)),
+        "right": plain("Green", (0.05, 0.4, 0.1)),
+        "back": plain("White", (0.7, 0.7, 0.7)),
+    }
+    shell(scene, PLAIN_M, **sides)
+    blue = principled("Blue", Base_Color=(0.05, 0.1, 0.4), Roughness=0.4)
+    scenes.add_box(scene, "Box", (1.6, 1.7, 0), (2.3, 2.4, 1.1), blue)
+    scenes.add_light(scene, "POINT", (0.9, 1.0, 2.0), energy=80.0, shadow_soft_size=0.1)
+
+
 ROOMS = {
     "bathroom": (bathroom,),
     "metal 0.1": (metal_walls, 0.1),
@@ -134,6 +158,9 @@ ROOMS = {
     "plastic 0.3, dark": (plastic, 0.3, 0.03),
     "plastic 0.5, dark": (plastic, 0.5, 0.03),
     "plastic 0.5, white": (plastic, 0.5, 0.8),
+    "all of white plastic": (all_of_plastic, 0.8),
+    "all of grey plastic": (all_of_plastic, 0.3),
+    "coloured plastic": (coloured_plastic,),
 }
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rooms with mirrors, metal and gloss against Cycles, at probes; and the same with all gloss sent in all directions.
+"""Rooms with mirrors, metal and gloss against Cycles, at probes; and the same with all gloss sent evenly.
 
 ``scripts/test 5.2 -- tests/blender/test_gloss_cycles.py -m nightly -s`` prints the table of docs/measurements.md.
 """
@@ -39,7 +39,8 @@ def measured(name, probes, samples):
     scene, size = glossy_rooms.build(name)
     snapshot = read_scene(scene)
     grid = Grid.from_bounds(0.12 * size, 0.88 * size, (4, 4, 3))
-    diffuse = replace(snapshot, materials=[replace(material, gloss=None) for material in snapshot.materials])
+    even = [replace(material, gloss=None, faint_gloss=None) for material in snapshot.materials]
+    diffuse = replace(snapshot, materials=even)
     jobs = [BakeJob(each, grid, BakeSettings()) for each in (snapshot, diffuse)]
     fields = [run_bake(job, Reporter(quiet=True), lambda: False).field for job in jobs]
     active = (fields[0].state == ACTIVE) & (fields[1].state == ACTIVE)
@@ -69,12 +70,15 @@ def show(name, gloss, diffuse, noise, floor):
 def test_gloss_against_cycles(gpu_context, name):
     gloss, diffuse, noise, floor = measured(name, 10, 128)
     show(name, gloss, diffuse, noise, floor)
-    assert gloss.relative_rms < 1.5 * (floor + noise) + 0.015
+    # Of gloss that is not followed the images of lamps are missing, which a darker surface does not outshine.
+    is_dark = name == "all of grey plastic"
+    assert gloss.relative_rms < 1.5 * (floor + noise) + (0.03 if is_dark else 0.015)
     assert gloss.relative_rms < 1.02 * diffuse.relative_rms
 
 
-def test_mirrors_help(gpu_context):
-    """One of these rooms, quickly."""
-    gloss, diffuse, noise, floor = measured("coated wood", 3, 8)
-    show("coated wood", gloss, diffuse, noise, floor)
-    assert gloss.relative_rms < 0.5 * diffuse.relative_rms
+@pytest.mark.parametrize("name", ["coated wood", "all of white plastic"])
+def test_gloss_helps(gpu_context, name):
+    """Followed or sent by angles: two of these rooms, quickly."""
+    gloss, diffuse, noise, floor = measured(name, 3, 8)
+    show(name, gloss, diffuse, noise, floor)
+    assert gloss.relative_rms < 0.5 * diffuse.relative_rms + noise
