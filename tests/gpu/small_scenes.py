@@ -190,6 +190,21 @@ def cluttered_room(lights=None, seed=0, clutter=24):
     )
 
 
+def with_small_emitter(room):
+    """``room`` and a small triangle in it that glows, of a material and an object of its own, the last ones."""
+    small = np.array([[(0.8, 0.3, 0.2), (0.85, 0.3, 0.2), (0.8, 0.35, 0.22)]])
+    return snapshot_of(
+        np.concatenate([room.triangle_positions, small]),
+        [*room.material_index, len(room.materials)],
+        [*room.materials, Material("small", (0.1, 0.1, 0.1), emission=(50.0, 60.0, 40.0))],
+        [*room.object_index, room.object_index.max() + 1],
+        np.concatenate([room.corner_uvs, np.zeros((1, 3, 2))]),
+        images=room.images,
+        world=room.world,
+        lights=room.lights,
+    )
+
+
 def moved(snapshot, matrix):
     """``snapshot`` under ``matrix`` (4, 4), a rotation, translation and uniform scale; light of lamps is not
     rescaled."""

@@ -12,7 +12,7 @@ from gridlight.core.settings import BakeSettings
 from gridlight.core.snapshot import Light, Material
 from gridlight.gpu_shaders.probe_paths import ProbePaths
 from gridlight.gpu_shaders.scene_textures import SceneTextures
-from small_scenes import all_lights, bake, box, cluttered_room, frame, snapshot_of
+from small_scenes import all_lights, bake, box, cluttered_room, frame, snapshot_of, with_small_emitter
 from stages import Stages
 
 GRID = Grid.from_bounds([-0.6, -0.5, -0.1], [0.7, 0.5, 0.1], (2, 2, 1))
@@ -24,22 +24,11 @@ SATIN = Gloss((0.5, 0.4, 0.3), (0.6, 0.5, 0.4), 0.8)
 def stages(gpu_context):
     """A cluttered room in which most is of plastic or satin."""
     lights = [all_lights()[name] for name in ("point soft", "spot soft", "sun wide", "rectangle")]
-    room = cluttered_room({light.name: light for light in lights})
-    small = np.array([[(0.8, 0.3, 0.2), (0.85, 0.3, 0.2), (0.8, 0.35, 0.22)]])
-    materials = [*room.materials, Material("small", (0.1, 0.1, 0.1), emission=(50.0, 60.0, 40.0))]
+    room = with_small_emitter(cluttered_room({light.name: light for light in lights}))
+    materials = list(room.materials)
     for number, gloss in ((0, PLASTIC), (1, PLASTIC), (2, SATIN), (4, SATIN)):
         materials[number] = replace(materials[number], faint_gloss=gloss)
-    snapshot = snapshot_of(
-        np.concatenate([room.triangle_positions, small]),
-        [*room.material_index, 6],
-        materials,
-        [*room.object_index, room.object_index.max() + 1],
-        np.concatenate([room.corner_uvs, np.zeros((1, 3, 2))]),
-        images=room.images,
-        world=room.world,
-        lights=lights,
-    )
-    return Stages(snapshot, GRID, BakeSettings(face=8, keep_all=True, seed=5, bounces=0))
+    return Stages(replace(room, materials=materials), GRID, BakeSettings(face=8, keep_all=True, seed=5, bounces=0))
 
 
 def close(found, expected, tolerance):

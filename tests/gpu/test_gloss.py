@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Glossy surfaces: closed forms, and every stage that knows them against its twin."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gridlight.core.emitters import sampling_density
@@ -13,7 +15,7 @@ from gridlight.core.snapshot import Light, Material
 from gridlight.gpu_shaders.probe_paths import ProbePaths
 from gridlight.gpu_shaders.scene_textures import SceneTextures
 from gridlight.gpu_shaders.textures import read
-from small_scenes import all_lights, bake, box, cluttered_room, frame, furnace, snapshot_of
+from small_scenes import all_lights, bake, box, cluttered_room, frame, furnace, snapshot_of, with_small_emitter
 from stages import Stages
 
 GRID = Grid.from_bounds([-0.6, -0.5, -0.1], [0.7, 0.5, 0.1], (2, 2, 1))
@@ -115,10 +117,8 @@ def stages(gpu_context):
     """A cluttered room with gloss of all kinds, sheets, lamps of all kinds and a small glowing triangle."""
     chosen = ("point", "point soft", "point sphere", "spot soft", "sun wide", "rectangle", "spread", "profiled")
     lights = [all_lights()[name] for name in chosen]
-    room = cluttered_room({light.name: light for light in lights})
-    small = np.array([[(0.8, 0.3, 0.2), (0.85, 0.3, 0.2), (0.8, 0.35, 0.22)]])
-    corners = np.concatenate([room.triangle_positions, small])
-    materials = [*room.materials, Material("small", (0.1, 0.1, 0.1), emission=(50.0, 60.0, 40.0))]
+    room = with_small_emitter(cluttered_room({light.name: light for light in lights}))
+    materials = list(room.materials)
     kinds = {
         0: SURFACES["coat"],
         1: Gloss((0.8, 0.7, 0.6), (0.7, 0.6, 0.5), 0.5),
@@ -131,17 +131,7 @@ def stages(gpu_context):
         **{**vars(materials[0]), "gloss": Gloss((0.1, 0.1, 0.1), (0.04, 0.04, 0.04), 0.1, fixed=True)}
     )
     materials[5] = Material(**{**vars(materials[5]), "transmitted": (0.5, 0.2, 0.1), "tint": (0.9, 0.5, 0.3)})
-    snapshot = snapshot_of(
-        corners,
-        [*room.material_index, 6],
-        materials,
-        [*room.object_index, room.object_index.max() + 1],
-        np.concatenate([room.corner_uvs, np.zeros((1, 3, 2))]),
-        images=room.images,
-        world=room.world,
-        lights=lights,
-    )
-    return Stages(snapshot, GRID, BakeSettings(face=8, keep_all=True, seed=5, bounces=0))
+    return Stages(replace(room, materials=materials), GRID, BakeSettings(face=8, keep_all=True, seed=5, bounces=0))
 
 
 def close(found, expected, tolerance):
