@@ -212,7 +212,7 @@ def test_falloff_of_a_lamp(gpu_context, output):
     check(scene)
 
 
-@pytest.mark.any_version
+@pytest.mark.nightly  # the lamp with a profile is measured by Cycles in the same way
 def test_lamp_that_shines_to_one_side(gpu_context):
     scene = wall_and_screen("Side")
     lamp = scenes.add_light(scene, "POINT", BEHIND, SLANTED, energy=20, shadow_soft_size=0.1)

@@ -115,7 +115,7 @@ def add_dust(scene, count):
 
 
 @pytest.mark.any_version
-@pytest.mark.parametrize("count", [5_000, pytest.param(100_000, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("count", [1_000, pytest.param(100_000, marks=pytest.mark.nightly)])
 def test_many_tiny_objects(gpu_context, count):
     expected = irradiance(run(read_scene(room()), volume()), volume().positions())
     scene = room()

@@ -59,7 +59,7 @@ def rooms(**options):
     )
 
 
-def grid(resolution=(5, 3, 2)):
+def grid(resolution=(4, 2, 2)):
     return Grid.from_bounds((-1.7, -0.8, -0.8), (1.7, 0.8, 0.8), resolution)
 
 
