@@ -148,6 +148,7 @@ def test_many_lamps(gpu_context):
     assert difference(irradiance(run(snapshot, grid, face=4, bounces=0), grid.positions()), expected) < 2e-3
 
 
+@pytest.mark.any_version
 def test_negative_emission_is_that_of_cycles(gpu_context):
     """A panel of negative strength in a lit room takes light away, in Cycles and here."""
     from gridlight.scene.cycles_reference import render_panoramas

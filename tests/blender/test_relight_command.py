@@ -40,6 +40,7 @@ def coefficients(path):
     return probe_file.read(path).coefficients
 
 
+@pytest.mark.any_version
 def test_relighting_other_files_and_frames(run_gridlight, files, tmp_path):
     out, fresh = tmp_path / "out", tmp_path / "fresh"
     states = [files["dimmed"], files["moved"], "10"]

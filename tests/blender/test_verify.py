@@ -118,6 +118,7 @@ class TestPoints:
         space.is_free(Grid.from_bounds([-0.1] * 3, [2.9] * 3, (3, 3, 3)).positions())  # nodes vote first, as in verify
         return space
 
+    @pytest.mark.any_version
     def test_free_points_stand_in_the_room_and_outside_its_boxes(self, space):
         """Also where the volume reaches into the walls and beyond them."""
         for low, high in ((0.05, 2.75), (-0.1, 2.9)):
