@@ -53,6 +53,7 @@ def test_one_ray_for_many(lamps):
     points = np.repeat(places, KEYS, axis=0)
     normals, role = np.tile([0.0, 0.0, 1.0], (len(points), 1)), np.zeros(len(points), int)
     keys, visible = keys_of(np.arange(len(points)), 0, 0), lamps.scene.visible
+    plain = np.tile([0.0, 0.0, 0.0, 1.0], (len(points), 1))  # light counts alike from everywhere
 
     def mean(values):
         return values.reshape(PLACES, KEYS, 3).mean(axis=1)
@@ -63,13 +64,15 @@ def test_one_ray_for_many(lamps):
         expected += mean(direct_light.irradiance(lamp, points, points, normals, u, visible))
     rays = []
     lamps.scene.visible = lambda origins, *way, **group: rays.append(len(origins)) or visible(origins, *way, **group)
-    each = np.array([lamps.irradiance(points, points, normals, keys, index, role) for index in range(SAMPLES)])
+    each = np.array([lamps.irradiance(points, points, normals, keys, index, role, plain) for index in range(SAMPLES)])
     assert sum(rays) <= MOST_PARTS * len(points) * SAMPLES
     deviation = np.std(each.reshape(SAMPLES, PLACES, KEYS, 3), axis=(0, 2))
     noise = deviation / np.sqrt(SAMPLES * KEYS)
     assert (np.abs(mean(each.mean(axis=0)) - expected) < 4 * noise + 2e-3 * expected.max()).all()
     assert deviation.max() < 0.5 * expected.max()
-    apart = sum(lamps.irradiance(points, points, normals, keys, 3, role, part) for part in light_parts(LAMPS, False))
+    apart = sum(
+        lamps.irradiance(points, points, normals, keys, 3, role, plain, part) for part in light_parts(LAMPS, False)
+    )
     np.testing.assert_allclose(apart, each[3])
 
 
