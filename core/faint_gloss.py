@@ -11,8 +11,8 @@ where m is the mean of (1 − cos θ)ᵖ over all directions, so that A(θ) has 
 
     C(θ) = 1 + k · S/A · ((1 − cos θ)ᵖ − m),
 
-on average again 1. What is sent is A(θ)/π times the irradiance so weighted. One ray a patch asks what surface it lies on; no
-light is lost or made. A lamp overhead counts 2.5 % less in a room of white plastic than one that is everywhere.
+on average again 1. What is sent is A(θ)/π times the irradiance so weighted. One ray a patch asks what surface it lies
+on; no light is lost or made. A lamp overhead counts 2.5 % less in a room of white plastic than one that is everywhere.
 
 M materials, N places; a coupling is (k · S/A per channel, p). Readable twin of surface_lib.glsl and coupling_lib.glsl.
 """
