@@ -31,7 +31,7 @@ from .triangles import bounds
 NODE_TEXELS = 7
 TRIANGLE_TEXELS = 3
 WIDTH = 4
-LEAF_SIZE = 2  # triangles; 1, 2, 4 and 8 are compared in docs/measurements.md
+LEAF_SIZE = 2  # triangles; 1, 2, 4 and 8 are compared in docs/history.md
 SEARCH_RADIUS = 8  # neighbours looked at on each side in Morton order
 MOST_STRETCH = 1.3  # how much dearer rays may get before building again pays, see docs/measurements.md
 _BLOCK = 1 << 14  # clusters per pass: keeps the working set in cache

@@ -8,7 +8,7 @@ disagree about the middle of the edge between them: each one's light plus its gr
 
 which is zero for quadratic light and h³/12 times the third derivative beyond, where the lookup errs by 0.069 D (RMS
 over the edge); where light jumps within a cell D is the jump and the lookup errs by up to half of it. The share in
-between that is used here was measured (docs/measurements.md, "Between probes: the estimate").
+between that is used here was measured (docs/history.md, "What `--error` learned").
 
 Fields without gradients are interpolated linearly, which is off by at most h²/8 times the second derivative: an eighth
 of the second difference of three probes in a row.

@@ -163,3 +163,19 @@ def curtain():
         tree.links.new(node(tree, kind, {"Color": color}).outputs[0], socket)
     scenes.add_plane(scene, "Curtain", (2.5, 0.1, 1.55), (1.1, 0, 0), (0, 0, 0.7), cloth)
     return scene, grid
+
+
+# Rooms that no setting was tuned to.
+ROOMS = {
+    "Cornell room, area light": in_cornell(),
+    "glowing panel 1 cm under the ceiling": panel,
+    "window, sun and sky": window,
+    "open ground, two boxes, sun and sky": outdoors,
+    "cube with its normals outwards, spot": spot_in_a_cube,
+    "corridor of 18 m, luminous panels": corridor,
+    "room lit through a door of 60 cm": open_door,
+    "garage, 24 strips of 4 cm": garage,
+    "room behind twenty slats, sun": slats,
+    "house of single planes, sun and sky": house,
+    "curtain of Diffuse and Translucent, sun": curtain,
+}

@@ -20,25 +20,11 @@ pytestmark = [pytest.mark.any_version, pytest.mark.nightly]
 POINTS, SAMPLES, HEIGHT = 12, 16, 32
 MOST_AT_PROBES = 3.5  # percent above the floor; the sun between slats is finer than texels
 
-ROOMS = {
-    "Cornell room, area light": measured_rooms.in_cornell(),
-    "glowing panel 1 cm under the ceiling": measured_rooms.panel,
-    "window, sun and sky": measured_rooms.window,
-    "open ground, two boxes, sun and sky": measured_rooms.outdoors,
-    "cube with its normals outwards, spot": measured_rooms.spot_in_a_cube,
-    "corridor of 18 m, luminous panels": measured_rooms.corridor,
-    "room lit through a door of 60 cm": measured_rooms.open_door,
-    "garage, 24 strips of 4 cm": measured_rooms.garage,
-    "room behind twenty slats, sun": measured_rooms.slats,
-    "house of single planes, sun and sky": measured_rooms.house,
-    "curtain of Diffuse and Translucent, sun": measured_rooms.curtain,
-}
-
 
 @pytest.mark.gpu
-@pytest.mark.parametrize("name", ROOMS)
+@pytest.mark.parametrize("name", measured_rooms.ROOMS)
 def test_rooms_that_nothing_was_tuned_to(gpu_context, name):
-    scene, grid = ROOMS[name]()
+    scene, grid = measured_rooms.ROOMS[name]()
     scene.view_layers[0].update()
     snapshot, quiet = read_scene(scene), Reporter(quiet=True)
     field = run_bake(BakeJob(snapshot, grid, BakeSettings()), quiet, lambda: False).field
