@@ -7,7 +7,7 @@ platform its wheels. Around it, this script
 * fetches the wheels into ``wheels/``, by name and pinned hash (``requirements/wheels.txt``);
 * builds from a copy without what git ignores, so that nothing lying about gets in;
 * writes each zip anew in a fixed order with a fixed date: the same files give the same bytes;
-* lets Blender validate what came out.
+* lets every Blender that the launcher has made an environment for validate what came out.
 
 Prints the path of each zip. Exit status 2 and one line where something is missing.
 """
@@ -30,6 +30,7 @@ ROOT = Path(__file__).resolve().parent.parent
 MANIFEST = "blender_manifest.toml"
 PINS = ROOT / "requirements" / "wheels.txt"
 WHEELS = ROOT / "wheels"
+PROGRAM = "*/scripts/addons_core/bl_pkg/cli/blender_ext.py"  # in a Blender
 DATE = (2026, 1, 1, 0, 0, 0)  # of every file in a zip
 FILE_MODE = 0o100644 << 16  # a plain file that everybody may read
 
@@ -67,11 +68,13 @@ def build(output: Path) -> list[Path]:
         for name in wheels:
             shutil.copyfile(WHEELS / name, source / "wheels" / name)
         built.mkdir()
-        _extension("build", "--split-platforms", "--source-dir", str(source), "--output-dir", str(built))
+        options = ["--split-platforms", "--source-dir", str(source), "--output-dir", str(built)]
+        _extension(_own_program(), "build", *options)
         done = []
         for path in sorted(built.glob("*.zip")):
             _write_reproducibly(path, output / path.name)
-            _extension("validate", str(output / path.name))
+            for program in _programs():
+                _extension(program, "validate", str(output / path.name))
             done.append(output / path.name)
     return done
 
@@ -108,18 +111,27 @@ def _copy_source(target: Path) -> None:
             shutil.copyfile(ROOT / name, target / name)
 
 
-def _extension(command: str, *arguments: str) -> None:
-    """Runs Blender's ``extension`` command, which is a plain Python program inside the bpy wheel."""
+def _own_program() -> Path:
+    """Blender's ``extension`` command, a plain Python program inside the bpy wheel of this environment."""
     spec = importlib.util.find_spec("bpy")
-    folder = Path(spec.origin).parent if spec and spec.origin else ROOT
-    programs = sorted(folder.glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py"))
+    programs = sorted(Path(spec.origin).parent.glob(PROGRAM)) if spec and spec.origin else []
     if not programs:
         raise BuildError("this Python has no Blender; run: make zip")
+    return programs[-1]
+
+
+def _programs() -> list[Path]:
+    """This environment's program and those of the others beside it: each Blender has rules of its own."""
+    return sorted({_own_program(), *ROOT.glob(f".venv*/lib/python*/site-packages/bpy/{PROGRAM}")})
+
+
+def _extension(program: Path, command: str, *arguments: str) -> None:
     done = subprocess.run(
-        [sys.executable, "-I", str(programs[-1]), command, *arguments], capture_output=True, text=True, check=False
+        [sys.executable, "-I", str(program), command, *arguments], capture_output=True, text=True, check=False
     )
     if done.returncode:
-        raise BuildError(f"Blender's 'extension {command}' failed:\n{done.stdout}{done.stderr}".rstrip())
+        series = program.parents[4].name
+        raise BuildError(f"'extension {command}' of Blender {series} failed:\n{done.stdout}{done.stderr}".rstrip())
 
 
 def _write_reproducibly(source: Path, target: Path) -> None:
