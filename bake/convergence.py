@@ -76,15 +76,24 @@ class Convergence:
         self.changes.append(relative)
         ratio = max(_ratio(self._lengths), self._slowest)
         last_missing, self.missing = self.missing, _still_missing(relative, ratio)
-        bounces = self.iterations - 1
         if self._bounces is not None:
-            self.done = bounces >= self._bounces
-            self.converged = self.missing < self._tolerance
-            self.reason = (
-                f"stopped after the {self._bounces} bounces asked for, "
-                f"an estimated {self.missing:.2g} of the light is missing"
-            )
-        elif bounces and self.missing < self._tolerance and (last_missing < self._tolerance or relative < _ROUNDING):
+            self._count(self._bounces)
+            return 0.0
+        self._judge(sums, relative, ratio, last_missing)
+        return 0.0 if self.done else self._leap(sums, overlap)
+
+    def _count(self, bounces: int) -> None:
+        """Ends after ``bounces``, settled or not."""
+        self.done = self.iterations - 1 >= bounces
+        self.converged = self.missing < self._tolerance
+        self.reason = (
+            f"stopped after the {bounces} bounces asked for, an estimated {self.missing:.2g} of the light is missing"
+        )
+
+    def _judge(self, sums: Sums, relative: float, ratio: float, last_missing: float) -> None:
+        """Is the light settled, or beyond hope? After a ``relative`` change that was ``ratio`` of the one before."""
+        bounces = self.iterations - 1
+        if bounces and self.missing < self._tolerance and (last_missing < self._tolerance or relative < _ROUNDING):
             self.done = self.converged = True
             self.reason = (
                 f"converged after {self.iterations} iterations: an estimated {self.missing:.2g} "
@@ -103,12 +112,17 @@ class Convergence:
                 f"not converged after {AUTO_LIMIT} bounces: each still adds {ratio:.4f} of the one before; "
                 "surfaces that reflect all light never settle, lower their base colour"
             )
-        elif len(self._lengths) >= _LEAST and self._is_parallel(overlap):
+
+    def _leap(self, sums: Sums, overlap: float) -> float:
+        """What ``add`` returns for light that goes on: the factor to extrapolate by. Begins a new series where it does
+        not stay."""
+        if len(self._lengths) >= _LEAST and self._is_parallel(overlap):
             step = self._lengths[-1] / self._lengths[-2]
             self._slowest = max(self._slowest, step)
             self._lengths.clear()
             return step / (1.0 - step)
-        elif (
+        bounces = self.iterations - 1
+        if (
             len(self._lengths) >= STATES
             and self._lengths[-1] < _MOST_RATIO * self._lengths[-2]
             and (bounces >= 2 * PATIENCE or not _has_hollows(sums))  # what is no hollow settles by itself

@@ -51,38 +51,62 @@ def write_results(
 ) -> tuple[dict, int]:
     """Stages probe files, pictures where they are drawn, and report in ``folder``. Returns (summary, exit status)."""
     names = volume_endings([result.field.grid.name for result in results])
-    images = []
+    images: list[tuple[str, bytes]] = []
     with stopwatch("write"):
         reporter.phase("write")
         for name, result in zip(names, results):
-            result.field.metadata = {
-                **result.field.metadata,
-                **probe_metadata.stated(
-                    origin.scene_name,
-                    origin.frame,
-                    origin.scene_hash,
-                    result.settings or settings,
-                    origin.device,
-                    result.iterations,
-                    result.converged,
-                    reporter.warnings,
-                ),
-                **({"error": result.error} if result.error else {}),
-            }
+            result.field.metadata |= _provenance(origin, settings, result, reporter.warnings)
             probe_file.write(folder.path(f"probes{name}.exr"), result.field)
         if draw is not None:
             reporter.phase("pictures", len(results))
             for name, result in zip(names, results):
-                pictures = folder.path(f"preview{name}.png"), folder.path(f"preview_probes{name}.png")
-                draw(result, *pictures)
-                volume = result.field.grid.name
-                images += [
-                    (f"{volume}: direct light and field", pictures[0].read_bytes()),
-                    (f"{volume}: probes", pictures[1].read_bytes()),
-                ]
+                images += _pictures(result, name, folder, draw)
                 reporter.advance()
     summary = _summary(results, origin.device, settings, stopwatch, reporter)
-    report = ReportData(
+    report = _report(origin, results, summary, images)
+    summary["files"] = [str(folder.folder / name) for name in [*folder.names, "report.html"]]
+    write_report(folder.path("report.html"), report)
+    return summary, NOT_CONVERGED if any(is_unsettled(result, settings) for result in results) else 0
+
+
+def _provenance(origin: Origin, settings: BakeSettings, result: BakeResult, warnings: list[str]) -> dict:
+    """What a probe file says about how it came to be."""
+    stated = probe_metadata.stated(
+        origin.scene_name,
+        origin.frame,
+        origin.scene_hash,
+        result.settings or settings,
+        origin.device,
+        result.iterations,
+        result.converged,
+        warnings,
+    )
+    return {**stated, **({"error": result.error} if result.error else {})}
+
+
+def _pictures(result: BakeResult, ending: str, folder: StagedFolder, draw: Draw) -> list[tuple[str, bytes]]:
+    """Draws both pictures of a volume into ``folder``; their titles and bytes for the report."""
+    scene, probes = folder.path(f"preview{ending}.png"), folder.path(f"preview_probes{ending}.png")
+    draw(result, scene, probes)
+    volume = result.field.grid.name
+    return [(f"{volume}: direct light and field", scene.read_bytes()), (f"{volume}: probes", probes.read_bytes())]
+
+
+def _report(origin: Origin, results: list[BakeResult], summary: dict, images: list[tuple[str, bytes]]) -> ReportData:
+    volumes = [
+        VolumeReport(
+            result.field,
+            result.field.grid.name,
+            result.energy,
+            result.change,
+            result.iterations,
+            result.converged,
+            result.notes,
+            result.error,
+        )
+        for result in results
+    ]
+    return ReportData(
         title=origin.title,
         settings=summary["settings"],
         device=origin.device,
@@ -90,26 +114,11 @@ def write_results(
         generator=f"Gridlight {probe_metadata.program_version()}",
         counts=summary["probes"],
         seconds=summary["seconds"],
-        warnings=reporter.warnings,
+        warnings=summary["warnings"],
         images=images,
         summary=summary,
-        volumes=[
-            VolumeReport(
-                result.field,
-                result.field.grid.name,
-                result.energy,
-                result.change,
-                result.iterations,
-                result.converged,
-                result.notes,
-                result.error,
-            )
-            for result in results
-        ],
+        volumes=volumes,
     )
-    summary["files"] = [str(folder.folder / name) for name in [*folder.names, "report.html"]]
-    write_report(folder.path("report.html"), report)
-    return summary, NOT_CONVERGED if any(is_unsettled(result, settings) for result in results) else 0
 
 
 def _summary(results, device: str, settings: BakeSettings, stopwatch: RunClock, reporter) -> dict:

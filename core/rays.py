@@ -143,58 +143,76 @@ def traverse(
     Every ray takes one step (a node or a leaf) per round, on a stack of ``hierarchy.stack_size`` entries as in the
     shader. ``Hits.triangle`` counts as in ``triangles``, not in leaf order.
     """
-    count = len(origins)
-    corners = np.asarray(triangles, float)[hierarchy.order]
-    boxes = hierarchy.nodes[:, : NODE_TEXELS - 1].reshape(-1, 2, 3, WIDTH).astype(float)
-    children = hierarchy.nodes[:, NODE_TEXELS - 1].astype(np.int64)
-    hits = Hits(np.broadcast_to(limits, count).astype(float), np.full(count, -1), np.zeros((count, 2)))
-    cost = TraversalCost(*(np.zeros(count, np.int64) for _ in range(3)))
-    stack = np.zeros((count, hierarchy.stack_size), np.int64)
-    stack_entry = np.zeros((count, hierarchy.stack_size))
-    top = np.zeros(count, np.int64)
-    item = np.zeros(count, np.int64)
-    active = np.arange(count)
-    with np.errstate(divide="ignore"):
-        inverse = 1.0 / np.where(np.abs(directions) < 1e-20, 1e-20, directions)
+    walk = _Walk(hierarchy, triangles, origins, directions, limits)
+    active = np.arange(len(origins))
     while len(active):
-        rays = active[item[active] >= 0]
-        cost.nodes[rays] += 1
-        node = item[rays]
-        planes = (boxes[node] - origins[rays, None, :, None]) * inverse[rays, None, :, None]
+        at_node = walk.item[active] >= 0
+        walk.enter_nodes(active[at_node])
+        walk.test_leaves(active[~at_node])
+        active = walk.pop(active)
+    return walk.hits, walk.cost
+
+
+class _Walk:
+    """Rays (N) on their way through a hierarchy: ``item`` (N,) is the node of each, or its leaf as −1−t."""
+
+    def __init__(self, hierarchy: Hierarchy, triangles: np.ndarray, origins, directions, limits):
+        count = len(origins)
+        self._hierarchy = hierarchy
+        self._corners = np.asarray(triangles, float)[hierarchy.order]
+        self._boxes = hierarchy.nodes[:, : NODE_TEXELS - 1].reshape(-1, 2, 3, WIDTH).astype(float)
+        self._children = hierarchy.nodes[:, NODE_TEXELS - 1].astype(np.int64)
+        self._origins, self._directions = origins, directions
+        with np.errstate(divide="ignore"):
+            self._inverse = 1.0 / np.where(np.abs(directions) < 1e-20, 1e-20, directions)
+        self.hits = Hits(np.broadcast_to(limits, count).astype(float), np.full(count, -1), np.zeros((count, 2)))
+        self.cost = TraversalCost(*(np.zeros(count, np.int64) for _ in range(3)))
+        self.item = np.zeros(count, np.int64)
+        self._pending = np.zeros((count, hierarchy.stack_size), np.int64)
+        self._entries = np.zeros((count, hierarchy.stack_size))
+        self._top = np.zeros(count, np.int64)
+
+    def enter_nodes(self, rays: np.ndarray) -> None:
+        """Has ``rays`` (R,) note which children of their nodes they enter, the nearest last."""
+        self.cost.nodes[rays] += 1
+        node = self.item[rays]
+        planes = (self._boxes[node] - self._origins[rays, None, :, None]) * self._inverse[rays, None, :, None]
         entry = np.maximum(planes.min(axis=1).max(axis=1), 0.0)
-        leave = np.minimum(planes.max(axis=1).min(axis=1), hits.distance[rays, None]) * 1.00000024
-        used = boxes[node, 0, 0] <= boxes[node, 1, 0]  # empty slots have inverted boxes
+        leave = np.minimum(planes.max(axis=1).min(axis=1), self.hits.distance[rays, None]) * 1.00000024
+        used = self._boxes[node, 0, 0] <= self._boxes[node, 1, 0]  # empty slots have inverted boxes
         entry = np.where((entry <= leave) & used, entry, np.inf)
         farthest_first = np.argsort(-entry, axis=1, kind="stable")
         for slot in farthest_first.T:
             distance = entry[np.arange(len(rays)), slot]
             entered = np.isfinite(distance)
             ray = rays[entered]
-            stack[ray, top[ray]] = children[node[entered], slot[entered]]
-            stack_entry[ray, top[ray]] = distance[entered]
-            top[ray] += 1
-        cost.stack[rays] = np.maximum(cost.stack[rays], top[rays])
+            self._pending[ray, self._top[ray]] = self._children[node[entered], slot[entered]]
+            self._entries[ray, self._top[ray]] = distance[entered]
+            self._top[ray] += 1
+        self.cost.stack[rays] = np.maximum(self.cost.stack[rays], self._top[rays])
 
-        rays = active[item[active] < 0]
-        index = -1 - item[rays]
+    def test_leaves(self, rays: np.ndarray) -> None:
+        """Holds ``rays`` (R,) against the triangles of their leaves."""
+        hits, index = self.hits, -1 - self.item[rays]
         while len(rays):
-            cost.triangles[rays] += 1
-            distance, barycentric = intersect(corners[index], origins[rays], directions[rays])
+            self.cost.triangles[rays] += 1
+            distance, barycentric = intersect(self._corners[index], self._origins[rays], self._directions[rays])
             nearer = distance < hits.distance[rays]
             hits.distance[rays[nearer]] = distance[nearer]
-            hits.triangle[rays[nearer]] = hierarchy.order[index[nearer]]
+            hits.triangle[rays[nearer]] = self._hierarchy.order[index[nearer]]
             hits.barycentric[rays[nearer]] = barycentric[nearer]
-            more = ~hierarchy.leaf_end[index]
+            more = ~self._hierarchy.leaf_end[index]
             rays, index = rays[more], index[more] + 1
 
-        searching = active
+    def pop(self, rays: np.ndarray) -> np.ndarray:
+        """Brings ``rays`` (R,) to the last thing noted that may still be nearer than their hit; returns those that have
+        one."""
         found = []
-        while len(searching):  # pop until something is left that may still be nearer
-            searching = searching[top[searching] > 0]
-            top[searching] -= 1
-            item[searching] = stack[searching, top[searching]]
-            useful = stack_entry[searching, top[searching]] <= hits.distance[searching]
-            found.append(searching[useful])
-            searching = searching[~useful]
-        active = np.concatenate(found)
-    return hits, cost
+        while len(rays):
+            rays = rays[self._top[rays] > 0]
+            self._top[rays] -= 1
+            self.item[rays] = self._pending[rays, self._top[rays]]
+            useful = self._entries[rays, self._top[rays]] <= self.hits.distance[rays]
+            found.append(rays[useful])
+            rays = rays[~useful]
+        return np.concatenate(found)

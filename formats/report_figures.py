@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from html import escape
 
 import numpy as np
@@ -48,45 +49,27 @@ def curve(
     if not shown.any():
         return '<p class="empty">nothing to show</p>'
     drawn = every[shown]
-    reach = np.append(drawn, threshold) if threshold and threshold > 0 else drawn
-    if logarithmic:
-        low, high = np.floor(np.log10(reach.min())), np.ceil(np.log10(reach.max()))
-        high = max(high, low + 1)
-        ticks = np.arange(low, high + 1, max(1, np.ceil((high - low) / 6)))
-        names = [f"10{_superscript(int(tick))}" for tick in ticks]
-    else:
-        ticks = _round_ticks(0.0, float(reach.max()) or 1.0)
-        low, high = 0.0, max(float(ticks[-1]), float(reach.max()) or 1.0)
-        names = [number(tick) for tick in ticks]
+    level = threshold if threshold and threshold > 0 else None
+    axis = _Axis.around(drawn if level is None else np.append(drawn, level), logarithmic)
 
     def x(iteration):
         return _LEFT + (WIDTH - _LEFT - _RIGHT) * (iteration - at[0] + 0.5) / max(len(at), 1)
 
-    def y(value):
-        height = np.log10(value) if logarithmic else value
-        return HEIGHT - _BOTTOM - (HEIGHT - _TOP - _BOTTOM) * (height - low) / (high - low)
-
-    parts = [_open(label)]
-    for tick, name in zip(ticks, names):
-        level = y(10**tick if logarithmic else tick)
-        parts.append(
-            f'<line class="grid" x1="{_LEFT}" x2="{WIDTH - _RIGHT}" y1="{level:.1f}" y2="{level:.1f}"/>'
-            f'<text x="{_LEFT - 8}" y="{level + 4:.1f}" text-anchor="end">{name}</text>'
-        )
+    parts = [_open(label), *axis.grid()]
     step = max(1, int(np.ceil(len(at) / 12)))
     for iteration in at[::step]:
         parts.append(
             f'<text x="{x(iteration):.1f}" y="{HEIGHT - _BOTTOM + 17}" text-anchor="middle">{iteration}</text>'
         )
     parts.append(f'<text class="axis" x="{(WIDTH + _LEFT) / 2}" y="{HEIGHT - 6}" text-anchor="middle">iteration</text>')
-    if threshold and threshold > 0:
-        level = y(threshold)
+    if level is not None:
         parts.append(
-            f'<line class="threshold" x1="{_LEFT}" x2="{WIDTH - _RIGHT}" y1="{level:.1f}" y2="{level:.1f}"/>'
-            f'<text class="threshold" x="{WIDTH - _RIGHT}" y="{level - 5:.1f}" text-anchor="end">'
+            f'<line class="threshold" x1="{_LEFT}" x2="{WIDTH - _RIGHT}" y1="{axis.y(level):.1f}" '
+            f'y2="{axis.y(level):.1f}"/>'
+            f'<text class="threshold" x="{WIDTH - _RIGHT}" y="{axis.y(level) - 5:.1f}" text-anchor="end">'
             f"{escape(threshold_label)}</text>"
         )
-    points = [(x(iteration), y(value), value, iteration) for iteration, value in zip(at[shown], drawn)]
+    points = [(x(iteration), axis.y(value), value, iteration) for iteration, value in zip(at[shown], drawn)]
     if len(points) > 1:
         parts.append(f'<polyline class="line" points="{" ".join(f"{px:.1f},{py:.1f}" for px, py, *_ in points)}"/>')
     if len(points) <= 80:
@@ -97,6 +80,42 @@ def curve(
             for px, py, value, iteration in points
         ]
     return "".join(parts) + "</svg>"
+
+
+@dataclass(frozen=True)
+class _Axis:
+    """An upright axis from ``low`` to ``high``, which are exponents of ten where it is ``logarithmic``."""
+
+    low: float
+    high: float
+    ticks: np.ndarray  # values
+    names: list[str]
+    logarithmic: bool
+
+    @classmethod
+    def around(cls, values: np.ndarray, logarithmic: bool) -> _Axis:
+        """From zero, or from the power of ten below, to where all ``values`` fit."""
+        if not logarithmic:
+            most = float(values.max()) or 1.0
+            ticks = _round_ticks(0.0, most)
+            return cls(0.0, max(float(ticks[-1]), most), ticks, [number(tick) for tick in ticks], False)
+        low, high = np.floor(np.log10(values.min())), np.ceil(np.log10(values.max()))
+        high = max(high, low + 1)
+        exponents = np.arange(low, high + 1, max(1, np.ceil((high - low) / 6)))
+        return cls(low, high, 10**exponents, [f"10{_superscript(int(exponent))}" for exponent in exponents], True)
+
+    def y(self, value: float) -> float:
+        """Where ``value`` stands in the figure."""
+        height = np.log10(value) if self.logarithmic else value
+        return HEIGHT - _BOTTOM - (HEIGHT - _TOP - _BOTTOM) * (height - self.low) / (self.high - self.low)
+
+    def grid(self) -> list[str]:
+        """A line and a name for each tick."""
+        return [
+            f'<line class="grid" x1="{_LEFT}" x2="{WIDTH - _RIGHT}" y1="{self.y(tick):.1f}" y2="{self.y(tick):.1f}"/>'
+            f'<text x="{_LEFT - 8}" y="{self.y(tick) + 4:.1f}" text-anchor="end">{name}</text>'
+            for tick, name in zip(self.ticks, self.names)
+        ]
 
 
 def histogram(values: np.ndarray, label: str, unit: str) -> str:

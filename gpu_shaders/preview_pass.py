@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import gpu
 import numpy as np
 
@@ -57,44 +59,20 @@ class PreviewPass:
         said so.
         """
         shading = shading or Shading()
-        field = self._field
-        if field and shading.mode == "ERROR":
-            field.find_error()
-        shader = program(
-            "preview_comp",
-            FACE=BACKGROUND_FACE,
-            TILE=TILE,
-            **(field.defines if field else NO_FIELD),
-            **self._scene.surface_defines,
-            **self._scene.sheet_defines,
-        )
+        if self._field and shading.mode == "ERROR":
+            self._field.find_error()
         pictures = [gpu.types.GPUTexture((width, height), format="RGBA32F") for _ in range(2)]
-        view = View.from_camera(camera, 0.01, 1000.0).relative_to(self._origin)
-        view_info = view_block(view, height)
-        shade_info = shading.block(field.offset if field else np.zeros(3))
-        radius = _SPHERE_SHARE * float(field.field.grid.cell_size().min()) if field else 0.0
-        spheres = field.spheres(view.camera.position, radius, _MOST_SPHERES) if field else np.zeros((0, 4))
-        radii = radius * np.where(spheres[:, 3] < 0, _HIDDEN, 1.0)
-        sphere_texture = upload(tiled_spheres(spheres, radii, view.camera, width, height), "spheres")
+        shader = self._shader()
+        bind = self._binding(shader, View.from_camera(camera, 0.01, 1000.0), width, height, shading)
         chosen: np.ndarray | None = None  # all
         listed = numbers(np.zeros(0), "pixels")
         for index in range(samples):
             if should_stop():
                 return None
-            self._scene.bind_surfaces(shader)
-            self._scene.bind(shader, "lights")
-            self._scene.bind_sheets(shader)
-            if field:
-                field.bind(shader)
-                shader.uniform_sampler("spheres", sphere_texture)
-                shader.uniform_float("sphere_radius", radius)
-            shader.uniform_sampler("world_texels", self._background)
-            shader.uniform_block("view_info", view_info)
-            shader.uniform_block("shade_info", shade_info)
+            bind()
             shader.image("picture", pictures[0])
             shader.image("probe_picture", pictures[1])
             shader.image("chosen", listed)
-            shader.uniform_int("light_count", (self._scene.light_count,))
             shader.uniform_int("sample_index", (index,))
             shader.uniform_int("chosen_count", (-1 if chosen is None else len(chosen),))
             dispatch_linear(shader, 64 * -(-width // 8) * -(-height // 8) if chosen is None else len(chosen))
@@ -111,6 +89,44 @@ class PreviewPass:
             values[..., :3] /= np.maximum(values[..., 3:], 1.0)
             values[..., 3] /= taken.reshape(height, width)
         return sums[0], sums[1]
+
+    def _shader(self) -> gpu.types.GPUShader:
+        return program(
+            "preview_comp",
+            FACE=BACKGROUND_FACE,
+            TILE=TILE,
+            **(self._field.defines if self._field else NO_FIELD),
+            **self._scene.surface_defines,
+            **self._scene.sheet_defines,
+        )
+
+    def _binding(
+        self, shader: gpu.types.GPUShader, view: View, width: int, height: int, shading: Shading
+    ) -> Callable[[], None]:
+        """What binds all that is the same for every sample of a picture; what it binds lives as long as it does."""
+        field = self._field
+        view = view.relative_to(self._origin)
+        view_info = view_block(view, height)
+        shade_info = shading.block(field.offset if field else np.zeros(3))
+        radius = _SPHERE_SHARE * float(field.field.grid.cell_size().min()) if field else 0.0
+        spheres = field.spheres(view.camera.position, radius, _MOST_SPHERES) if field else np.zeros((0, 4))
+        radii = radius * np.where(spheres[:, 3] < 0, _HIDDEN, 1.0)
+        sphere_texture = upload(tiled_spheres(spheres, radii, view.camera, width, height), "spheres")
+
+        def bind() -> None:
+            self._scene.bind_surfaces(shader)
+            self._scene.bind(shader, "lights")
+            self._scene.bind_sheets(shader)
+            if field:
+                field.bind(shader)
+                shader.uniform_sampler("spheres", sphere_texture)
+                shader.uniform_float("sphere_radius", radius)
+            shader.uniform_sampler("world_texels", self._background)
+            shader.uniform_block("view_info", view_info)
+            shader.uniform_block("shade_info", shade_info)
+            shader.uniform_int("light_count", (self._scene.light_count,))
+
+        return bind
 
 
 def _read_all(pictures, width: int, height: int) -> list[np.ndarray]:

@@ -12,7 +12,8 @@ from ..core.errors import GridlightError, InputError
 from ..core.grid import Grid
 from ..core.snapshot import SceneSnapshot
 from ..scene.read import read_scene
-from ..scene.volumes import box_of, create_volume, fit_volume, is_volume, resolution_for, resolution_of
+from ..scene.volume_fit import fit_volume
+from ..scene.volumes import box_of, create_volume, is_volume, resolution_for, resolution_of
 from . import names
 from .libraries import library_of
 from .volume_choice import active_volume, can_read_scene, in_object_mode, volumes_of

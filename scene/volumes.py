@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Probe volumes: those that stand in the scene as Empties, and (from ``volume_fit``) one for a scene that has none."""
+"""Probe volumes that stand in the scene as Empties. One for a scene that has none: ``volume_fit``."""
 
 from __future__ import annotations
 
@@ -11,18 +11,6 @@ from mathutils import Matrix
 
 from ..core.settings import MAX_RESOLUTION
 from ..core.snapshot import Volume
-from .volume_fit import fit_volume, fitted_bounds
-
-__all__ = [
-    "box_of",
-    "create_volume",
-    "find_volumes",
-    "fit_volume",
-    "fitted_bounds",
-    "is_volume",
-    "resolution_for",
-    "resolution_of",
-]
 
 MARK, RESOLUTION = "gridlight_volume", "gridlight_resolution"
 

@@ -94,11 +94,6 @@ class LiveBake:
         return self._wanted is not None or self._steps is not None
 
     @property
-    def is_waiting(self) -> bool:
-        """Whether a scene was given that nothing has begun with."""
-        return self._wanted is not None
-
-    @property
     def is_settling(self) -> bool:
         """Whether nothing but exact fields is being worked on."""
         return self._is_settling and self._steps is not None

@@ -9,7 +9,8 @@ import pytest
 from gridlight.core.errors import InputError
 from gridlight.core.grid import Grid
 from gridlight.scene.read import read_scene
-from gridlight.scene.volumes import create_volume, find_volumes, fit_volume, fitted_bounds
+from gridlight.scene.volume_fit import fit_volume, fitted_bounds
+from gridlight.scene.volumes import create_volume, find_volumes
 from mathutils import Euler, Matrix
 from scene_builders import empty_scene, material, place, quad
 
