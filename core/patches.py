@@ -115,12 +115,15 @@ def caught(ends: np.ndarray) -> np.ndarray:
     patches it is the rays but the first that are looked at, which stay.
     """
     result = np.zeros(len(ends), bool)
-    for patch in range(len(ends)):
-        members, rest = [patch], list(ends[patch])
-        while rest and len(members) <= MOST_CAUGHT and NOTHING not in rest:
+    ends_of = ends.tolist()
+    for patch, rest in enumerate(ends_of):
+        members = [patch]
+        while rest and NOTHING not in rest:
             found = [end for end in dict.fromkeys(rest) if end != NO_PATCH and end not in members]
             members += found
-            rest = [end for member in found for end in ends[member, 1:]]
+            if len(members) > MOST_CAUGHT:
+                break
+            rest = [end for member in found for end in ends_of[member][1:]]
         result[patch] = not rest
     return result
 

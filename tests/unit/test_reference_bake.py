@@ -46,14 +46,26 @@ def irradiance_at_nodes(field):
 
 
 GRID = Grid.from_bounds([-0.8, -0.79, -0.81], [0.8, 0.78, 0.77], (2, 2, 3))
+FEW = Grid.from_bounds([-0.8, -0.79, -0.81], [0.8, 0.78, 0.77], (2, 1, 1))
 
 
-@pytest.mark.parametrize("inward", [False, True])
-@pytest.mark.parametrize("albedo,bounces,gather", [(0.0, 0, 0), (0.5, 14, 0), (0.5, 2, 0), (0.7, 1, 2)])
+ONCE = pytest.mark.any_version
+
+
+@pytest.mark.parametrize(
+    "albedo,bounces,gather,inward",
+    [
+        pytest.param(0.0, 0, 0, False, marks=ONCE),
+        pytest.param(0.5, 14, 0, False, marks=ONCE),
+        pytest.param(0.5, 2, 0, True, marks=ONCE),
+        (0.7, 1, 2, False),
+        pytest.param(0.7, 1, 2, True, marks=ONCE),
+    ],
+)
 def test_furnace(albedo, bounces, gather, inward):
     """Emission 1 and albedo a: radiance Σ aⁱ, whichever way the normals point; a gather adds its segments."""
     snapshot = room(Material("m", (albedo,) * 3, emission=(1.0, 1.0, 1.0)), inward=inward)
-    field = bake(snapshot, GRID, BakeSettings(bounces=bounces, face=4, gather=gather))
+    field = bake(snapshot, FEW, BakeSettings(bounces=bounces, face=4, gather=gather))
     assert (field.state == 1).all()
     expected = np.pi * sum(albedo**i for i in range(bounces + gather + 1))
     np.testing.assert_allclose(irradiance_at_nodes(field), expected, rtol=1e-9)
