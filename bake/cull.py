@@ -9,10 +9,13 @@ from ..core import culling
 from ..core.conventions import ACTIVE, CULLED
 from ..core.errors import InputError
 from ..core.grid import Grid
+from ..core.kept import Kept
 from ..core.open_air import OPEN, open_nodes
 from ..core.probe_edits import ProbeEdits
 from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
+
+_kept_needed = Kept(lambda grid, vertices, triangles: culling.needed_nodes(grid, vertices[triangles]))
 
 
 def cull(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, edits: ProbeEdits) -> np.ndarray:
@@ -23,7 +26,7 @@ def cull(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, edits: Pro
     """
     state = np.full(grid.count, ACTIVE, np.uint8)
     if not settings.keep_all:
-        state[~culling.needed_nodes(grid, snapshot.triangle_positions)] = CULLED
+        state[~_kept_needed(grid, snapshot.vertices, snapshot.triangles)] = CULLED
     state[edits.disabled] = CULLED
     if edits.disabled.any() and not (state == ACTIVE).any():
         raise InputError(f"{grid.name}: every probe is switched off; bring some back with Reset in the Volume panel")

@@ -12,6 +12,7 @@ import numpy as np
 from ..core import clearance, relocation
 from ..core.clearance import Obstacles
 from ..core.grid import Grid
+from ..core.kept import Kept
 from ..core.orientation import ShellVote
 from ..core.steps import Steps
 from ..gpu_shaders.backend import GpuBackend
@@ -19,6 +20,7 @@ from ..gpu_shaders.probe_views import exits, sightings
 from .batches import Batches
 
 _WALLS_OF_A_CORNER = 3
+_kept_clear = Kept(clearance.keep_clear, last=1 + _WALLS_OF_A_CORNER)
 
 
 @dataclass
@@ -41,7 +43,7 @@ class Placement:
         count = len(nodes)
         by_hand = by_hand_m[nodes].any(axis=1)
         home = (grid.positions() + by_hand_m)[nodes]
-        home[~by_hand] = clearance.keep_clear(grid, nodes[~by_hand], home[~by_hand], obstacles)
+        home[~by_hand] = _kept_clear(grid, nodes[~by_hand], home[~by_hand], obstacles)
         return cls(
             nodes,
             home,
@@ -180,7 +182,7 @@ def _keep_clear(
 
     def keep_clear() -> np.ndarray:
         at = (placement.home + placement.step)[settled]
-        return clearance.keep_clear(grid, placement.nodes[settled], at, obstacles(), also_behind=True)
+        return _kept_clear(grid, placement.nodes[settled], at, obstacles(), True)
 
     placement.step[settled] = (yield from batches.pace.in_background(keep_clear)) - placement.home[settled]
 

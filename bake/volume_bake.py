@@ -18,7 +18,6 @@ from ..core.conventions import ACTIVE, CULLED
 from ..core.extrapolation import Sums
 from ..core.orientation import ShellVote, inside_solid
 from ..core.settings import BakeSettings
-from ..core.snapshot import SceneSnapshot
 from ..core.steps import Pace, Steps
 from ..gpu_shaders.backend import GpuBackend
 from ..gpu_shaders.scene_textures import SceneTextures
@@ -74,7 +73,6 @@ class VolumeBake:
         self._stopwatch = stopwatch or Stopwatch({})
         self._stopwatch.seconds = self.result.seconds
         self._pace = pace or Pace(None)
-        self._obstacles_of: tuple[SceneSnapshot, Obstacles] | None = None
         self.unshown = np.zeros(0, bool)  # (S,): probes whose light has changed since ``show`` was there
         self._scene = scene
         self._part = part
@@ -132,12 +130,10 @@ class VolumeBake:
         return cull(self.snapshot, self.grid, self.settings, self._edits)
 
     def _obstacles(self) -> Obstacles:
-        """What probes keep clear of; found once per state of the scene."""
+        """What probes keep clear of."""
         if self._part is not None:
             return self._part.obstacles
-        if self._obstacles_of is None or self._obstacles_of[0] is not self.snapshot:
-            self._obstacles_of = (self.snapshot, Obstacles.of(self.grid, self.snapshot))
-        return self._obstacles_of[1]
+        return Obstacles.of(self.grid, self.snapshot)
 
     def _stand_at_home(self) -> Steps[None]:
         """Puts the probes of all slots where they belong, with no light yet."""

@@ -52,8 +52,10 @@ def gridlight(request: dict, reporter, should_stop) -> int:
     warm: list[dict] = []
     started = time.perf_counter()
     while not only and (not warm or (len(warm) < _MOST_WARM and time.perf_counter() - started < _WARM_SECONDS)):
-        del last  # a bake's textures are freed before the next starts
+        shown = last.snapshot, last.result.scene  # live on until the next bake is done, as in the interface
+        del last  # a bake's other textures are freed before the next starts
         last = _bake_once(scene, request["scene"], settings, "warm", reporter, should_stop)
+        del shown
         warm.append(last.row)
     if warm:
         report({**median_row(warm), "runs": len(warm)})

@@ -139,7 +139,7 @@ class _Bakes:
         grid = Grid.from_bounds([_INSET_M] * 3, HALL_SIZE_M - _INSET_M, resolution_for(case["probes"]))
         settings = BakeSettings(**{**self._settings, "face": case["face"], "capture": capture, "keep_all": True})
         clock = PhaseClock()
-        bvh.forget()
+        bvh.kept_or_built.forget()
         snapshot = with_lamps(self._snapshot, case["lamps"])
         started = time.perf_counter()
         session = BakeSession(BakeJob(snapshot, grid, settings), clock, stopwatch=clock)

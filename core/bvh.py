@@ -26,6 +26,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .kept import Kept
 from .triangles import bounds
 
 NODE_TEXELS = 7
@@ -67,23 +68,7 @@ def build(triangles: np.ndarray) -> Hierarchy:
     return _flatten(tree, order)
 
 
-_kept: list[tuple[np.ndarray, Hierarchy]] = []  # the last triangles that ``kept_or_built`` was given, and theirs
-
-
-def kept_or_built(triangles: np.ndarray) -> Hierarchy:
-    """``build``, or what it made the last time if ``triangles`` are the same as then: a scene is baked again and again
-    while its light, materials and settings are tuned."""
-    for before, hierarchy in _kept[-1:]:
-        if np.array_equal(before, triangles):
-            return hierarchy
-    hierarchy = build(triangles)
-    _kept[:] = [(triangles, hierarchy)]
-    return hierarchy
-
-
-def forget() -> None:
-    """The next hierarchy is built in any case: for measurements."""
-    _kept.clear()
+kept_or_built = Kept(build)
 
 
 def refit(

@@ -19,6 +19,7 @@ import numpy as np
 
 from .cell_ranges import cells_of_boxes
 from .grid import Grid
+from .kept import Kept
 from .snapshot import SceneSnapshot
 from .triangles import bounds
 
@@ -47,17 +48,7 @@ class Obstacles:
     def of(cls, grid: Grid, snapshot: SceneSnapshot) -> Obstacles:
         """The triangles of objects larger than the clearance: dust, leaves and threads hide nothing from a probe beside
         them."""
-        triangles = snapshot.triangle_positions
-        low, high = bounds(triangles)
-        starts = np.flatnonzero(np.diff(snapshot.object_index, prepend=-1))  # of runs of triangles of one object
-        lowest, highest = np.full((2, max(len(snapshot.object_names), 1), 3), [[[np.inf]], [[-np.inf]]])
-        if len(starts):
-            objects = snapshot.object_index[starts]
-            np.minimum.at(lowest, objects, np.minimum.reduceat(low, starts))
-            np.maximum.at(highest, objects, np.maximum.reduceat(high, starts))
-        large = np.linalg.norm(highest - lowest, axis=1) > CLEARANCE * grid.cell_size().min()
-        found = cls(triangles, *_in_lattice(grid, low, high))
-        return found if large.all() else found._chosen(large[snapshot.object_index])
+        return _kept_obstacles(grid, snapshot.vertices, snapshot.triangles, snapshot.object_index)
 
     def within(self, low: np.ndarray, high: np.ndarray) -> Obstacles:
         """Those that reach into the box ``low`` .. ``high`` (3,) of the lattice."""
@@ -65,6 +56,24 @@ class Obstacles:
 
     def _chosen(self, which: np.ndarray) -> Obstacles:
         return Obstacles(self.triangles[which], self.low[which], self.high[which])
+
+
+def _large_objects(grid: Grid, vertices: np.ndarray, vertices_of: np.ndarray, object_index: np.ndarray) -> Obstacles:
+    """``Obstacles.of`` triangles ``vertices_of`` (T, 3), each of the object ``object_index`` (T,)."""
+    triangles = vertices[vertices_of]
+    low, high = bounds(triangles)
+    starts = np.flatnonzero(np.diff(object_index, prepend=-1))  # of runs of triangles of one object
+    lowest, highest = np.full((2, int(object_index.max(initial=0)) + 1, 3), [[[np.inf]], [[-np.inf]]])
+    if len(starts):
+        objects = object_index[starts]
+        np.minimum.at(lowest, objects, np.minimum.reduceat(low, starts))
+        np.maximum.at(highest, objects, np.maximum.reduceat(high, starts))
+    large = np.linalg.norm(highest - lowest, axis=1) > CLEARANCE * grid.cell_size().min()
+    found = Obstacles(triangles, *_in_lattice(grid, low, high))
+    return found if large[object_index].all() else found._chosen(large[object_index])
+
+
+_kept_obstacles = Kept(_large_objects)
 
 
 def _in_lattice(grid: Grid, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

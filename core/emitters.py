@@ -15,6 +15,7 @@ from .conventions import LUMINANCE
 from .grid import Grid
 from .light_links import link_roles
 from .snapshot import SceneSnapshot
+from .triangles import areas
 
 CANDIDATES = 8  # points on emitters, of which a surface's shadow ray goes to one
 PROBE_POINTS = 4096  # on emitters that each probe considers besides its texels
@@ -36,8 +37,8 @@ def sampling_density(snapshot: SceneSnapshot, grid: Grid) -> np.ndarray:
     glowing = np.flatnonzero(luminance > 0)
     if not len(glowing):
         return density
-    corners = snapshot.vertices[snapshot.triangles]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    corners = snapshot.triangle_positions
+    area = areas(corners)
     per_object = np.bincount(snapshot.object_index[glowing], area[glowing], len(snapshot.object_names))
     most = max(float((grid.cell_size() ** 2).sum()), _SELDOM_SHARE * float(area.sum()))
     passing = _passing(snapshot)[snapshot.material_index[glowing]]

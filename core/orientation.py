@@ -56,12 +56,13 @@ class ShellVote:
     def add(self, sightings: np.ndarray) -> None:
         """``sightings`` (P, S): per probe ±(object + 1) of S directions, negative from behind, half a unit farther
         from zero where lit; 0 background."""
+        self.any_light |= bool((sightings == 0).any() or (sightings % 1 != 0).any())
+        sightings = sightings[(sightings < 0).any(axis=1)]  # the others have nothing to say
         size = np.abs(sightings)
         seen = sightings != 0
         item = np.floor(size).astype(np.int64) - 1
         open_ = (~seen).mean(axis=1) >= _OPEN_SHARE
         lit = (size > item + 1.25) | open_[:, None]
-        self.any_light |= bool(((size > item + 1.25) | ~seen).any())
         probe = np.broadcast_to(np.arange(len(sightings))[:, None], sightings.shape)
         # A probe in front of an object may hit the far side of an edge; only those that see mostly back faces count.
         pair = probe[seen] * len(self.behind) + item[seen]

@@ -361,7 +361,7 @@ class GpuBackend:
         """What the probes in ``layers_`` (L,) see of sampled emitters; ``project`` and ``gather`` add it."""
         layers_and_count = numbers(layers_, "probes"), len(layers_)
         where = self.probe_slots, surfaces.first, surfaces.textures, layers_and_count
-        project_emitters(self.scene, self.settings, where, self._texel_weights, self._gradient, self._emitted, _GROUP)
+        project_emitters(self.scene, self.settings, where, self._texel_weights, self._gradient, self._emitted)
 
     @property
     def slot_count(self) -> int:

@@ -359,7 +359,7 @@ def emission_project_comp(info, defines):
     _samplers(info, "geometry", "emission", kind="FLOAT_2D_ARRAY", first=slot)
     _image(info, 0, "emitted")
     _image(info, 1, "emitted_gradient")
-    _ints(info, "first_slot", "light_count", "samples", "seed")
+    _ints(info, "first_slot", "light_count", "seed")
     info.push_constant("FLOAT", "nearest")
     _group_sums(info, defines)
     return {

@@ -7,10 +7,12 @@ import gpu
 
 from ..core.emitters import PROBE_POINTS, PROBE_RAYS
 from ..core.settings import BakeSettings
+from .dispatch import is_software
 from .gradient_pass import GradientPass
 from .programs import program
 from .scene_textures import SceneTextures
 
+_SUMS_BYTES = 40 << 10  # that a group may share for its sums: any GPU has 48 KiB, and lists take some
 _Layers = tuple[gpu.types.GPUTexture, int]
 _Where = tuple[gpu.types.GPUTexture, int, dict, _Layers]
 
@@ -22,7 +24,6 @@ def project_emitters(
     texel_weights: gpu.types.GPUTexture,
     gradient: GradientPass,
     emitted: gpu.types.GPUTexture,
-    group: int,
 ) -> None:
     """Writes it to ``emitted`` and its change to ``gradient.emitted``. ``where``: slots of probes, the one of layer 0,
     the images of texel surfaces, a list of their layers and its length."""
@@ -32,9 +33,10 @@ def project_emitters(
         FACE=settings.face,
         BANDS=settings.bands,
         COEFFICIENTS=settings.bands**2,
-        GROUP=group,
+        GROUP=_threads_a_probe(settings.bands**2),
         GRADIENT_COEFFICIENTS=gradient.coefficients,
         CANDIDATE_COUNT=PROBE_POINTS,
+        RAYS=PROBE_RAYS,
         **scene.light_defines,
     )
     scene.bind_surfaces(shader)
@@ -48,6 +50,12 @@ def project_emitters(
     shader.image("emitted_gradient", gradient.emitted)
     shader.uniform_float("nearest", gradient.nearest)
     shader.uniform_int("first_slot", (first_slot,))
-    shader.uniform_int("samples", (PROBE_RAYS,))
     shader.uniform_int("seed", (settings.seed,))
     gpu.compute.dispatch(shader, count, 1, 1)
+
+
+def _threads_a_probe(coefficients: int) -> int:
+    """That share its candidates: on a GPU as many as can put their sums side by side, see group_sum_lib.glsl."""
+    if is_software():
+        return 64
+    return 256 if 16 * 256 * coefficients <= _SUMS_BYTES else 128

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import weakref
+from dataclasses import dataclass
+
 import gpu
 import numpy as np
 
@@ -14,7 +17,33 @@ from .textures import ROW, allocate, upload
 _EXTENSIONS = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2, "MIRROR": 3, "ATLAS": 4}
 
 
-def send_images(images: list[Image]) -> tuple[gpu.types.GPUTexture, gpu.types.GPUTexture]:
+@dataclass(frozen=True, eq=False)
+class ImageTextures:
+    """``images`` on the GPU. Nothing of it changes, so scenes of the same images share it."""
+
+    images: list[Image]
+    table: gpu.types.GPUTexture
+    texels: gpu.types.GPUTexture
+
+
+_last: list[weakref.ref[ImageTextures]] = []  # sent, as long as a scene has them
+
+
+def kept_or_sent(images: list[Image]) -> ImageTextures:
+    """``images``, as another scene has them if they are its very pixels."""
+    last = _last[0]() if _last else None
+    if last is not None and len(last.images) == len(images) and all(map(_same, last.images, images)):
+        return last
+    textures = ImageTextures(images, *_send_all(images))
+    _last[:] = [weakref.ref(textures)]
+    return textures
+
+
+def _same(one: Image, other: Image) -> bool:
+    return one.pixels is other.pixels and one.extension == other.extension
+
+
+def _send_all(images: list[Image]) -> tuple[gpu.types.GPUTexture, gpu.types.GPUTexture]:
     """Table of ``images`` and their texels: each image starts a row, its mip levels follow one another.
 
     Raises:

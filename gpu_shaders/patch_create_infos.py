@@ -38,7 +38,7 @@ def patch_claim_comp(info, defines):
     _atomic(info, 0, "table")
     _atomic(info, 1, "leaders")
     _image(info, 2, "slots", pixel="R32F")
-    _ints(info, "item_count", "hit_count", "variant", "table_mask", "found")
+    _ints(info, "item_count", "hit_count", "variant", "table_mask")
     return _linear(info, "random_lib", "patch_cell_lib", "patch_claim_comp")
 
 
@@ -117,17 +117,21 @@ def patch_join_comp(info, defines):
     if "HAS_VIEW" in defines:
         _image(info, 2, "seen", pixel="R32F")
     _ints(info, "item_count", "hit_count", "first_new", "row_length", "is_last")
-    return _linear(
-        info,
-        "octahedral_lib",
-        "random_lib",
-        "patch_cell_lib",
-        *_surface_files(defines),
-        "offset_lib",
-        "ray_lib",
-        "patch_sight_lib",
-        "patch_join_comp",
-    )
+    return _linear(info, *_sight_files(defines), "patch_join_comp")
+
+
+def patch_look_comp(info, defines):
+    slot = _scene(info, defines, attributes=False)
+    slot = _samplers(info, "hits", "hit_keys", "patch_keys", "patch_points", first=slot)
+    _samplers(info, "table", kind="UINT_2D", first=slot)
+    _image(info, 0, "bound", pixel="R32F", access="READ+WRITE")
+    _ints(info, "hit_count", "table_mask")
+    return _linear(info, *_sight_files(defines), "patch_look_comp")
+
+
+def _sight_files(defines: dict) -> list[str]:
+    cells = ["octahedral_lib", "random_lib", "patch_cell_lib"]
+    return [*cells, *_surface_files(defines), "offset_lib", "ray_lib", "patch_sight_lib"]
 
 
 def patch_points_comp(info, defines):

@@ -13,7 +13,7 @@ import numpy as np
 from ..core.patches import ALL, EMITTERS, SAMPLES, Part, lamps_a_ray, light_parts, spread_points
 from ..core.settings import BakeSettings
 from ..core.steps import Pace, Steps
-from .dispatch import COMPACTION_BLOCK, dispatch_linear
+from .dispatch import compaction_groups, compaction_run, dispatch_linear
 from .growing_array import GrowingArray, Scratch, fill_elements
 from .places import Places
 from .programs import program
@@ -140,11 +140,13 @@ class PatchDirect:
         """Patches that ``light``, the part in ``row``, should light with each of SAMPLES and has not yet, marked as lit
         so: lists of ``count`` elements one after the other. Their lengths go into elements of ``counts`` from ``first``
         on."""
-        blocks = max(-(-self.count // COMPACTION_BLOCK), 1)
+        blocks = max(compaction_groups(self.count), 1)
         block_counts = self.scratch("block counts", blocks * len(SAMPLES), "patches", "R32F")
         due = self.scratch(f"due {row}", self.count * len(SAMPLES), "patches", "R32F")
         for name in ("compact_count_comp", "patch_due_comp"):
-            shader = program(name, DUE=name == "compact_count_comp")
+            if name == "compact_count_comp" and blocks == 1:
+                continue
+            shader = program(name, DUE=name == "compact_count_comp", RUN=compaction_run())
             shader.uniform_sampler("spread", light.spread.texture)
             shader.uniform_sampler("lights", lights)
             shader.uniform_sampler("mean_lights", self._mean_lights.texture)

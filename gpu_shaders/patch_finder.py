@@ -19,7 +19,7 @@ import numpy as np
 from ..core.errors import InputError
 from ..core.grid import Grid
 from ..core.patches import MOST_ROUNDS, NO_PATCH, NOTHING, POINTS, VARIANTS, CellRule, coarser_by
-from .dispatch import COMPACTION_BLOCK, dispatch_linear
+from .dispatch import compaction_groups, compaction_run, dispatch_linear
 from .growing_array import GrowingArray, fill_elements
 from .places import Places, find_couplings
 from .programs import program
@@ -114,7 +114,7 @@ class PatchFinder:
         shader.uniform_sampler("probe_slots", probe_slots)
         shader.uniform_int("first_slot", (first_slot,))
         dispatch_linear(shader, bind.count)
-        self._join_all(bind, found=True)
+        self._join_or_found(bind)
         return bind.bound
 
     def bind_ends(self, hits: Places, count: int, round_: int) -> gpu.types.GPUTexture:
@@ -122,10 +122,13 @@ class PatchFinder:
         rays see gets the coarser patches the more rays it takes to see it, in the last round none."""
         bind = _Bind(hits, count, 4, {})
         dispatch_linear(self._keys_shader(bind, NOTHING), count)
-        self._join_all(bind, found=round_ == 0)
-        if 0 < round_ < MOST_ROUNDS - 1:
+        if round_ == 0:
+            self._join_or_found(bind)
+            return bind.bound
+        self._look(bind)
+        if round_ < MOST_ROUNDS - 1:
             dispatch_linear(self._keys_shader(bind, NOTHING, coarser_by(round_), only_lost=True), count)
-            self._join_all(bind, found=True)
+            self._join_or_found(bind)
         return bind.bound
 
     def _keys_shader(self, bind: _Bind, without_surface: int, coarser: int = 0, only_lost: bool = False):
@@ -141,16 +144,32 @@ class PatchFinder:
             shader.uniform_int(name, (value,))
         return shader
 
-    def _join_all(self, bind: _Bind, found: bool) -> None:
-        """Gives the pending hits of ``bind`` their patches; without ``found`` none is new."""
+    def _look(self, bind: _Bind) -> None:
+        """Gives the pending hits of ``bind`` the patches that are there, where they see one."""
+        shader = program("patch_look_comp", **self._scene.ray_defines)
+        self._scene.bind_rays(shader)
+        for name, texture in (
+            ("hits", bind.hits),
+            ("hit_keys", bind.keys),
+            ("patch_keys", self._keys.texture),
+            ("patch_points", self.points),
+            ("table", self._table),
+        ):
+            shader.uniform_sampler(name, texture)
+        shader.image("bound", bind.bound)
+        shader.uniform_int("hit_count", (bind.count,))
+        shader.uniform_int("table_mask", (self._places - 1,))
+        dispatch_linear(shader, bind.count)
+
+    def _join_or_found(self, bind: _Bind) -> None:
+        """Gives the pending hits of ``bind`` their patches, new ones where there are none."""
         first_new = self.count
-        self._reserve_table(self.count + (bind.count if found else 0))
+        self._reserve_table(self.count + bind.count)
         items, item_count = bind.bound, -1  # all hits; the texture stands in for a list that is not read
         for variant in range(VARIANTS):
             before = self._totals[0]
-            self._claim(bind, items, item_count, variant, found)
-            if found:
-                self._number(bind, items, item_count, variant)
+            self._claim(bind, items, item_count, variant)
+            self._number(bind, items, item_count, variant)
             last = variant == VARIANTS - 1
             self._join(bind, items, item_count, first_new, before, last)
             if last or bind.count <= _FEW:
@@ -158,11 +177,10 @@ class PatchFinder:
             items, item_count = self._pending(bind, items, item_count)
             if item_count == 0:
                 break
-        if found:
-            self.count = self._most = _number_in(self._totals[0])
-            self._choose_points(bind, first_new)
+        self.count = self._most = _number_in(self._totals[0])
+        self._choose_points(bind, first_new)
 
-    def _claim(self, bind: _Bind, items, item_count: int, variant: int, found: bool) -> None:
+    def _claim(self, bind: _Bind, items, item_count: int, variant: int) -> None:
         shader = program("patch_claim_comp")
         for name, texture in (
             ("items", items),
@@ -178,20 +196,19 @@ class PatchFinder:
             ("hit_count", bind.count),
             ("variant", variant),
             ("table_mask", self._places - 1),
-            ("found", int(found)),
         ):
             shader.uniform_int(name, (value,))
         dispatch_linear(shader, bind.entries(item_count))
 
     def _number(self, bind: _Bind, items, item_count: int, variant: int) -> None:
         """Makes patches of the cells that were claimed."""
-        counts = self._compact("compact_count_comp", bind, items, item_count, leaders=True)
+        counts = self._count_by_block(bind, items, item_count, leaders=True)
         entries = bind.entries(item_count)
         if entries <= _FEW:
             self._most += entries  # a hit leads one patch at most
         else:
-            blocks = -(-entries // COMPACTION_BLOCK)
-            self._most = _number_in(self._totals[0]) + int(read(counts, blocks, channels=1).sum())
+            per_block = read(counts, compaction_groups(entries), channels=1)
+            self._most = _number_in(self._totals[0]) + int(per_block.sum())
         self._reserve(self._most)
         sheets = bind.sheets is not None
         shader = self._compaction("patch_number_comp", bind, items, item_count, leaders=True, HAS_SHEETS=sheets)
@@ -211,7 +228,7 @@ class PatchFinder:
         ):
             shader.image(name, texture)
         shader.uniform_int("variant", (variant,))
-        gpu.compute.dispatch(shader, -(-entries // COMPACTION_BLOCK), 1, 1)
+        gpu.compute.dispatch(shader, compaction_groups(entries), 1, 1)
         self._totals.reverse()
 
     def _join(self, bind: _Bind, items, item_count: int, first_new: int, before, last: bool) -> None:
@@ -243,7 +260,7 @@ class PatchFinder:
 
     def _pending(self, bind: _Bind, items, item_count: int) -> tuple[gpu.types.GPUTexture, int]:
         """The hits that are still without a patch, in order."""
-        counts = self._compact("compact_count_comp", bind, items, item_count)
+        counts = self._count_by_block(bind, items, item_count)
         entries = bind.entries(item_count)
         listed = scratch(entries, "hits", "R32F")
         total = gpu.types.GPUTexture((1, 1), format="R32F")
@@ -251,19 +268,22 @@ class PatchFinder:
         shader.uniform_sampler("block_counts", counts)
         shader.image("total_out", total)
         shader.image("pending", listed)
-        gpu.compute.dispatch(shader, -(-entries // COMPACTION_BLOCK), 1, 1)
+        gpu.compute.dispatch(shader, compaction_groups(entries), 1, 1)
         return listed, _number_in(total)
 
-    def _compact(self, name: str, bind: _Bind, items, item_count: int, leaders: bool = False):
-        shader = self._compaction(name, bind, items, item_count, leaders)
-        blocks = -(-bind.entries(item_count) // COMPACTION_BLOCK)
+    def _count_by_block(self, bind: _Bind, items, item_count: int, leaders: bool = False) -> gpu.types.GPUTexture:
+        """Of entries to be picked; something that nobody reads where there is but one block."""
+        blocks = compaction_groups(bind.entries(item_count))
+        if blocks == 1:
+            return bind.bound
+        shader = self._compaction("compact_count_comp", bind, items, item_count, leaders)
         counts = scratch(blocks, "hits", "R32F")
         shader.image("block_counts", counts)
         gpu.compute.dispatch(shader, blocks, 1, 1)
         return counts
 
     def _compaction(self, name: str, bind: _Bind, items, item_count: int, leaders: bool = False, **defines):
-        shader = program(name, LEADERS=leaders, **defines)
+        shader = program(name, LEADERS=leaders, RUN=compaction_run(), **defines)
         shader.uniform_sampler("items", items)
         shader.uniform_sampler("bound", bind.bound)
         if leaders:

@@ -7,19 +7,21 @@ float32.
 
 from __future__ import annotations
 
-import gpu
 import numpy as np
 
 from ..core import bvh, emitters
 from ..core.errors import InputError
 from ..core.faint_gloss import faint_rows
 from ..core.gloss import gloss_rows
+from ..core.kept import Kept
 from ..core.light_links import link_roles
 from ..core.scene_changes import SceneChanges, ShapeChange, boxes_around
 from ..core.sheets import sheet_numbers
 from ..core.snapshot import Light, SceneSnapshot
 from ..core.steps import Pace, Steps, run
-from .image_textures import send_images
+from ..core.triangles import areas
+from .dispatch import is_software
+from .image_textures import kept_or_sent
 from .lamp_rows import pack_lights, with_profiles
 from .scatter import scatter_rows
 from .textures import upload
@@ -180,6 +182,8 @@ class SceneTextures:
         # Bits, see ray_lib.
         rows[:, 1, 3] = clips[material] + 2 * unseen[material] + 16 * tinted[material] + 32 * roles
         rows[:, 2, 3] = sheet_of_material[material]
+        attributes = _kept_attributes if len(corners) == len(order) else _attributes
+        of_surface = snapshot.corner_normals, snapshot.corner_uvs, snapshot.object_index
         return {
             "materials": _materials(snapshot),
             "sheets": sheets.astype(np.float32),
@@ -189,13 +193,14 @@ class SceneTextures:
             "faint_gloss": faint_rows([material.faint_gloss for material in snapshot.materials]),
             "emitters": _emitters(self._density, self.corners, order),
             "triangle_corners": rows,
-            "triangle_attributes": _attributes(snapshot, order[at], material, corners, self._density[at]),
+            "triangle_attributes": attributes(*of_surface, order[at], material, corners, self._density[at]),
         }
 
     def _send_images(self, snapshot: SceneSnapshot) -> None:
         self.has_images = bool(snapshot.images)
         if self.has_images:
-            self._textures["image_table"], self._textures["image_texels"] = send_images(snapshot.images)
+            self._images = kept_or_sent(snapshot.images)
+            self._textures["image_table"], self._textures["image_texels"] = self._images.table, self._images.texels
 
     @property
     def surface_defines(self) -> dict:
@@ -211,7 +216,7 @@ class SceneTextures:
             "HAS_LINKS": self._links.groups > 0,
             "LINK_GROUPS": self._links.groups or None,
             "STACK_SIZE": stack_size,
-            "LEAN_STACK": gpu.platform.device_type_get() != "SOFTWARE",
+            "LEAN_STACK": not is_software(),
         }
 
     @property
@@ -319,20 +324,34 @@ class SceneTextures:
 
 
 def _attributes(
-    snapshot: SceneSnapshot, order: np.ndarray, material: np.ndarray, corners: np.ndarray, density: np.ndarray
+    normals: np.ndarray,
+    uvs: np.ndarray,
+    objects: np.ndarray,
+    order: np.ndarray,
+    material: np.ndarray,
+    corners: np.ndarray,
+    density: np.ndarray,
 ) -> np.ndarray:
-    """(T, 5, 4) rows of surface_lib's triangle_attributes, in leaf order."""
-    uvs = snapshot.corner_uvs[order].astype(np.float32)
+    """(T', 5, 4) rows of surface_lib's triangle_attributes.
+
+    Args:
+        normals, uvs, objects: of corners and of all T triangles, as snapshots have them.
+        order: (T',) those that are asked for, in leaf order, as are the rest.
+    """
+    uvs = uvs[order].astype(np.float32)
     rows = np.zeros((len(order), 5, 4), np.float32)
-    rows[:, 0:3, :3] = snapshot.corner_normals[order]
+    rows[:, 0:3, :3] = normals[order]
     rows[:, 0, 3] = material
-    rows[:, 1, 3] = snapshot.object_index[order]
+    rows[:, 1, 3] = objects[order]
     rows[:, 2, 3] = _uv_scale(corners, uvs)
     rows[:, 3] = uvs[:, :2].reshape(-1, 4)
     rows[:, 4, :2] = uvs[:, 2]
     rows[:, 4, 2] = density
     rows[:, 4, 3] = order
     return rows
+
+
+_kept_attributes = Kept(_attributes)
 
 
 def _emitters(density: np.ndarray, corners: np.ndarray, order: np.ndarray) -> np.ndarray:
@@ -342,8 +361,7 @@ def _emitters(density: np.ndarray, corners: np.ndarray, order: np.ndarray) -> np
     They stand in the snapshot's order: which point a random number picks then does not depend on the hierarchy."""
     triangle = np.flatnonzero(density > 0)
     triangle = triangle[np.argsort(order[triangle])]
-    edge = (corners[triangle, 1:] - corners[triangle, :1]).astype(np.float64)
-    area = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1) / 2
+    area = areas(corners[triangle].astype(np.float64))
     rows = np.zeros((len(triangle), 4), np.float32)
     rows[:, 0] = triangle
     rows[:, 1] = np.cumsum(density[triangle] * area)
@@ -358,11 +376,9 @@ def _emitters(density: np.ndarray, corners: np.ndarray, order: np.ndarray) -> np
 
 def _uv_scale(corners: np.ndarray, uvs: np.ndarray) -> np.ndarray:
     """(T,) uv units per metre: square root of the ratio of areas."""
-    edge = corners[:, 1:] - corners[:, :1]
-    area = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1)
     uv_edge = uvs[:, 1:] - uvs[:, :1]
     uv_area = np.abs(uv_edge[:, 0, 0] * uv_edge[:, 1, 1] - uv_edge[:, 0, 1] * uv_edge[:, 1, 0])
-    return np.sqrt(uv_area / np.maximum(area, 1e-30))
+    return np.sqrt(uv_area / np.maximum(2 * areas(corners), 1e-30))
 
 
 def _materials(snapshot: SceneSnapshot) -> np.ndarray:

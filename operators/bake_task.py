@@ -162,9 +162,11 @@ class BakeTask:
             kept.relay.target = self.progress
             yield from kept.session.relight(snapshot)
             return kept
+        shown = kept.session.result.scene if kept else None  # the next one shares its images
         del kept
         fresh = KeptBake(BakeJob(snapshot, grid, self.settings, edits), self.progress, self._goal)
         yield from fresh.bake()
+        del shown
         return fresh
 
     def _find_scene(self) -> bpy.types.Scene:

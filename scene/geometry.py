@@ -14,6 +14,8 @@ from math import prod
 import bpy
 import numpy as np
 
+from ..core.triangles import cross
+
 # A triangle thinner than this share of its longest edge has no area that light could fall on.
 _NEEDLE = 1e-7
 
@@ -146,7 +148,7 @@ def _split_quads(copy: MeshCopy) -> tuple[np.ndarray, np.ndarray]:
     a, b, c, d = (copy.vertices[copy.corner_vertices[quads + corner]] for corner in range(4))
     with np.errstate(invalid="ignore", over="ignore"):  # corners that are not finite are dropped later
         diagonal = c - a
-        other = np.einsum("qi,qi->q", _cross(b - a, diagonal), _cross(d - a, diagonal)) > 0
+        other = np.einsum("qi,qi->q", cross(b - a, diagonal), cross(d - a, diagonal)) > 0
     split = np.where(other[:, None, None], [[0, 1, 3], [1, 2, 3]], [[0, 1, 2], [0, 2, 3]])
     faces = np.repeat(np.arange(len(first), dtype=np.int32), 1 + is_quad)
     corners = first[faces, None] + np.arange(3, dtype=np.int32)
@@ -266,21 +268,9 @@ def _has_area(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """(T,) bool."""
     a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
     ab, ac, bc = b - a, c - a, c - b
-    doubled_area = np.linalg.norm(_cross(ab, ac), axis=1)
+    doubled_area = np.linalg.norm(cross(ab, ac), axis=1)
     longest = np.maximum(np.maximum((ab * ab).sum(1), (ac * ac).sum(1)), (bc * bc).sum(1))
     return doubled_area > _NEEDLE * longest
-
-
-def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Row-wise cross product; several times faster than numpy's on a million rows."""
-    return np.stack(
-        [
-            u[:, 1] * v[:, 2] - u[:, 2] * v[:, 1],
-            u[:, 2] * v[:, 0] - u[:, 0] * v[:, 2],
-            u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0],
-        ],
-        axis=1,
-    )
 
 
 def _normalise(world: WorldTriangles) -> None:
@@ -290,7 +280,7 @@ def _normalise(world: WorldTriangles) -> None:
     if missing.any():
         rows = np.flatnonzero(missing.any(axis=1))
         a, b, c = (world.vertices[world.triangles[rows, corner]] for corner in range(3))
-        normals = _cross(b - a, c - a)
+        normals = cross(b - a, c - a)
         sizes = np.linalg.norm(normals, axis=1, keepdims=True)
         normals = np.where(sizes > 0, normals / np.where(sizes > 0, sizes, 1), [0.0, 0.0, 1.0]).astype(np.float32)
         world.corner_normals[missing] = np.repeat(normals[:, None], 3, axis=1)[missing[rows]]

@@ -3,9 +3,13 @@
 
 from __future__ import annotations
 
+import weakref
+from collections.abc import Callable
+
 import bpy
 import numpy as np
 
+from ..core.kept import fingerprint
 from ..core.snapshot import Image
 from .image_interpolation import MOST_EDGE, finer_grid
 from .notices import Notices
@@ -28,6 +32,10 @@ _SRGB_TO_LINEAR, _FINE_TO_LINEAR = _decoded_srgb(256), _decoded_srgb(1 << 16)
 _BYTE_TO_LINEAR = _ENCODED.astype(np.float32)
 
 
+# Pixels made of what an image held, by image and node, as long as anybody uses them; None where none were worth making.
+_made: dict[tuple, tuple[tuple, Callable[[], np.ndarray | None]]] = {}
+
+
 class ImageTable:
     """Reads images and collects those that materials use, in the order of ``SceneSnapshot.images``."""
 
@@ -35,6 +43,8 @@ class ImageTable:
         self.images: list[Image] = []
         self._notices = notices
         self._pixels: dict[tuple, np.ndarray | None] = {}
+        self._contents: dict[int, tuple] = {}
+        self._stored: tuple[int, np.ndarray] | None = None  # what ``_encoded`` read last, by image
         self._channels: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         self._whole: dict[int, np.ndarray] = {}
         self._indices: dict[tuple[int, str], int] = {}
@@ -55,7 +65,7 @@ class ImageTable:
             return self._pixels[key]
         own = image.as_pointer(), interpolation, extension
         if own not in self._pixels:
-            finer = self._interpolated(image, interpolation, extension)
+            finer = self._kept(image, (interpolation, extension), lambda: self._interpolated(image, *own[1:]))
             self._pixels[own] = self._pixels[key] if finer is None else finer
         return self._pixels[own]
 
@@ -93,9 +103,51 @@ class ImageTable:
                 "find it with File > External Data or pack it into the file"
             )
             return None
-        encoded = np.empty((height, width, image.channels), np.float32)
-        image.pixels.foreach_get(encoded.ravel())
         table = self._decoding(image)
+        return self._kept(image, (), lambda: self._linear(image, table))
+
+    def _kept(
+        self, image: bpy.types.Image, shown: tuple[str, ...], make: Callable[[], np.ndarray | None]
+    ) -> np.ndarray | None:
+        """What ``make`` makes of ``image`` for nodes that have it ``shown`` so; what it made in an earlier reading if
+        the image holds the same and that is still in use."""
+        key, content = (image.session_uid, *shown), self._content(image)
+        if key in _made and _made[key][0] == content:
+            self._stored = None
+            return _made[key][1]()
+        pixels = make()
+        if pixels is None:
+            _made[key] = content, lambda: None
+        else:
+            pixels.flags.writeable = False
+            _made[key] = content, weakref.ref(pixels, lambda gone: _forget(key, gone))
+        return pixels
+
+    def _content(self, image: bpy.types.Image) -> tuple:
+        """All that pixels are made of, asked once a reading."""
+        key = image.as_pointer()
+        if key not in self._contents:
+            encoded = self._encoded(image)
+            self._stored = key, encoded
+            space = image.colorspace_settings
+            how = image.alpha_mode, image.is_float, space.name, space.is_data
+            self._contents[key] = *encoded.shape, *how, fingerprint(encoded)
+        return self._contents[key]
+
+    def _encoded(self, image: bpy.types.Image) -> np.ndarray:
+        """(height, width, channels) float32 as Blender stores them, to be used up."""
+        stored, self._stored = self._stored, None
+        if stored is not None and stored[0] == image.as_pointer():
+            return stored[1]
+        size: tuple[int, int] = image.size
+        encoded = np.empty((size[1], size[0], image.channels), np.float32)
+        image.pixels.foreach_get(encoded.ravel())
+        return encoded
+
+    def _linear(self, image: bpy.types.Image, table: np.ndarray | None) -> np.ndarray:
+        """(height, width, 4), decoded by ``table`` where there is one and box-filtered down to MAX_EDGE."""
+        encoded = self._encoded(image)
+        height, width = encoded.shape[:2]
         columns = min(width, max(1, round(width * min(1.0, MAX_EDGE / max(width, height)))))
         rows = min(height, max(1, round(height * min(1.0, MAX_EDGE / max(width, height)))))
         # A channel-packed fourth channel has nothing to do with the other three, and one of ones changes nothing.
@@ -116,12 +168,9 @@ class ImageTable:
 
     def _interpolated(self, image: bpy.types.Image, interpolation: str, extension: str) -> np.ndarray | None:
         """The pixels of an opaque sRGB image with those between them; None where that makes no difference."""
-        size: tuple[int, int] = image.size
-        width, height = size
-        if max(size) > MOST_EDGE:  # not even read a second time
+        if max(image.size) > MOST_EDGE:  # not even read a second time
             return None
-        encoded = np.empty((height, width, image.channels), np.float32)
-        image.pixels.foreach_get(encoded.ravel())
+        encoded = self._encoded(image)
         if encoded.shape[2] == 4 and bool((encoded[..., 3] != 1).any()):
             return None
         finer = finer_grid(encoded[..., :3], _srgb_to_linear, interpolation, extension)
@@ -145,6 +194,11 @@ class ImageTable:
         if space.name != "sRGB":
             self._notices.append(f"image '{image.name}' has colour space '{space.name}': it is read as sRGB")
         return _SRGB_TO_LINEAR
+
+
+def _forget(key: tuple, gone: weakref.ref) -> None:
+    if key in _made and _made[key][1] is gone:
+        del _made[key]
 
 
 def _srgb_to_linear(values: np.ndarray) -> np.ndarray:

@@ -256,14 +256,14 @@ def apply_domain(domain: Domain, corner_uvs: np.ndarray) -> np.ndarray:
 
 def _solid_where_opaque(opacity: Value) -> Value:
     """Constant 1 for an alpha texture without holes, so that nobody samples it."""
-    if not opacity.is_constant and float(opacity.array().min()) > 1 - _LEAST_OPACITY:
+    if not opacity.is_constant and opacity.least() > 1 - _LEAST_OPACITY:
         return ONE
     return opacity
 
 
 def _white_where_clear(tint: Value) -> Value:
     """White for holes that colour nothing, so that nobody asks them."""
-    return WHITE if float(tint.array().min()) > 1 - _LEAST_OPACITY else tint
+    return WHITE if tint.least() > 1 - _LEAST_OPACITY else tint
 
 
 def _color(value: Value) -> tuple[float, float, float]:

@@ -9,18 +9,20 @@ import bpy
 import numpy as np
 
 from ..core.errors import InputError
+from ..core.kept import Kept
 from ..core.light_links import Links
 from ..core.snapshot import DIFFUSE_RAYS, SHADOW_RAYS, Light, SceneSnapshot, World
 from ..core.steps import STEP_SECONDS, Pace, Steps, run
 from .camera import read_camera
 from .evaluation import as_in_viewport, at_render_quality, rendered_objects
-from .geometry import MeshArrays, MeshCopy, WorldTriangles, copy_mesh, place, triangulated
+from .geometry import MeshArrays, MeshCopy, copy_mesh, triangulated
 from .images import ImageTable
 from .instance_facts import InstanceFacts, facts_of
 from .light_linking import LightLinking
 from .lights import INTENSITY_PROPERTY, LightTable
-from .materials import Look, MaterialTable, apply_domain
+from .materials import Look, MaterialTable
 from .notices import Notices
+from .placed_mesh import PlacedMesh, joined_surface
 from .surface_parts import AtlasUVs, SurfaceParts
 from .surface_values import ATLAS, Wants, wants
 from .volumes import find_volumes
@@ -178,7 +180,7 @@ def _read(scene, view_layer, evaluate, pace: Pace, world: World | None = None) -
             yield
         placed = {material for row, material in zip(group.rows, group.materials) if materials.domains[row] == ATLAS}
         group.atlases = [atlas for material in placed if (atlas := surfaces.corner_uvs(material, group)) is not None]
-    surface = yield from pace.in_background(_assembled, list(harvest.groups.values()), materials, notices)
+    surface = yield from pace.in_background(_surface, list(harvest.groups.values()), materials, notices)
     lights = LightTable(images, notices, measures=world is None)
     for found in harvest.lights:
         lights.add(*found)
@@ -293,96 +295,39 @@ def _slot_materials(item: bpy.types.Object, mesh: bpy.types.Mesh) -> list[bpy.ty
     return [material.original if material else None for material in materials]
 
 
+_kept_triangles = Kept(lambda copies: [triangulated(copy) for copy in copies])
+_kept_surface = Kept(joined_surface)
+
+
 def _all_triangulated(meshes: dict[tuple, tuple[MeshCopy, str]], notices: Notices) -> dict[tuple, MeshArrays]:
-    return {key: _triangulated(copy, name, notices) for key, (copy, name) in meshes.items()}
-
-
-def _triangulated(copy: MeshCopy, name: str, notices: Notices) -> MeshArrays:
-    arrays = triangulated(copy)
-    if arrays.not_finite:
-        notices.append(
-            f"object '{name}': {arrays.not_finite} triangles have corners that are not finite and are left out; "
-            "clean the mesh up"
-        )
-    if arrays.needles:
-        notices.group("triangles without area are left out", f"{name} ({arrays.needles})")
-    return arrays
-
-
-def _assembled(groups: list[_Instances], materials: MaterialTable, notices: Notices) -> dict[str, np.ndarray]:
-    """All triangles of the scene with their per-triangle arrays. Asks Blender nothing: all materials are read."""
-    parts = []
-    objects = 0
-    for group in groups:
-        part = _assemble(group, materials, objects, notices)
-        objects += len(group.names)
-        if part is not None:
-            parts.append(part)
-    return _joined(parts)
-
-
-def _assemble(group: _Instances, materials: MaterialTable, first_object: int, notices: Notices) -> dict | None:
-    """World triangles of ``group`` with their per-triangle arrays; None where nothing is left."""
-    mesh = group.mesh
-    used = group.rows[np.clip(mesh.slots, 0, len(group.rows) - 1)]
-    uvs = _corner_uvs(mesh, used, materials, group.names[0], notices)
-    for chosen, own in group.atlases:
-        uvs[chosen] = own
-    visible = ~np.isin(used, [row for row in np.unique(used) if materials.is_hole(row)])
-    if not visible.any():
-        return None
-    if not visible.all():
-        mesh = MeshArrays(
-            mesh.vertices, mesh.triangles[visible], mesh.corner_normals[visible], mesh.slots[visible], {}, ""
-        )
-        used, uvs = used[visible], uvs[visible]
-    count = len(group.matrices)
-    world: WorldTriangles = place(mesh, uvs, np.array(group.matrices))
-    return {
-        "vertices": world.vertices,
-        "triangles": world.triangles,
-        "corner_normals": world.corner_normals,
-        "corner_uvs": world.corner_uvs,
-        "material_index": np.tile(used, count),
-        "object_index": np.repeat(np.arange(first_object, first_object + count, dtype=np.int32), len(used)),
-    }
-
-
-def _corner_uvs(
-    mesh: MeshArrays, used: np.ndarray, materials: MaterialTable, name: str, notices: Notices
-) -> np.ndarray:
-    """(T, 3, 2) float32 texture coordinates, each triangle's through its own material's mapping."""
-    uvs = np.zeros((len(mesh.triangles), 3, 2), np.float32)
-    for row in np.unique(used):
-        if not materials.is_textured(row):
-            continue
-        domain = materials.domains[row]
-        if domain == ATLAS:
-            continue
-        source = mesh.uv_maps.get(domain.uv_map or mesh.active_uv_map)
-        if source is None:
-            notices.group(
-                f"without the UV map of material '{materials.materials[row].name}' a texture shows one colour", name
+    found = _kept_triangles([copy for copy, _name in meshes.values()])
+    for arrays, (_copy, name) in zip(found, meshes.values()):
+        if arrays.not_finite:
+            notices.append(
+                f"object '{name}': {arrays.not_finite} triangles have corners that are not finite and are left out; "
+                "clean the mesh up"
             )
-            continue
-        mine = used == row
-        uvs[mine] = apply_domain(domain, source[mine])
-    return uvs
+        if arrays.needles:
+            notices.group("triangles without area are left out", f"{name} ({arrays.needles})")
+    return dict(zip(meshes, found))
 
 
-def _joined(parts: list[dict]) -> dict:
-    """One array per field; vertex indices move behind the parts before."""
-    if not parts:
-        return {
-            "vertices": np.empty((0, 3)),
-            "triangles": np.empty((0, 3), np.int32),
-            "corner_normals": np.empty((0, 3, 3), np.float32),
-            "corner_uvs": np.empty((0, 3, 2), np.float32),
-            "material_index": np.empty(0, np.int32),
-            "object_index": np.empty(0, np.int32),
-        }
-    offset = 0
-    for part in parts:
-        part["triangles"] += offset
-        offset += len(part["vertices"])
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+def _surface(groups: list[_Instances], materials: MaterialTable, notices: Notices) -> dict[str, np.ndarray]:
+    """All triangles of the scene with their per-triangle arrays. Asks Blender nothing: all materials are read."""
+    arrays, without_uvs = _kept_surface(
+        [
+            PlacedMesh(
+                group.mesh,
+                group.rows,
+                [materials.domains[row] if materials.is_textured(row) else None for row in group.rows],
+                np.array([materials.is_hole(row) for row in group.rows], bool),
+                group.atlases,
+                np.array(group.matrices),
+            )
+            for group in groups
+        ]
+    )
+    for index, slot in without_uvs:
+        name = materials.materials[groups[index].rows[slot]].name
+        notices.group(f"without the UV map of material '{name}' a texture shows one colour", groups[index].names[0])
+    return arrays

@@ -142,16 +142,17 @@ def _image_texture(evaluator, node, socket, scope):
         )
         domain = SCATTERED
     color, alpha = evaluator.images.channels(pixels)
+    cover = Value(np.ones(1, np.float32), alpha, domain)
     if socket.name == "Alpha":
-        return Value(np.ones(1, np.float32), alpha, domain)
+        return cover
     value = Value(np.ones(1, np.float32), color, domain)
     # Cycles keeps the premultiplied colour where nobody asks for the alpha.
     if (
         node.image.alpha_mode in ("STRAIGHT", "PREMUL")
         and not find_socket(node.outputs, "Alpha").is_linked
-        and alpha.min() < 1
+        and cover.least() < 1
     ):
-        value = apply(np.multiply, value, Value(np.ones(1, np.float32), alpha, domain))
+        value = apply(np.multiply, value, cover)
     return value
 
 

@@ -1,11 +1,10 @@
 /* Compaction: entries that `is_selected` picks, in their order. A library before this one says what an entry stands for (`item`, −1 past the
  * end) and which are picked.
  *
- * compact_count_comp counts per block of BLOCK entries, then a shader places what was picked: 256 threads a block, RUN entries one after the
+ * compact_count_comp counts per block of BLOCK entries, where there is more than one, then a shader places what was picked: 256 threads a block, RUN entries one after the
  * other a thread. Groups of one y make one list.
  */
 
-const int RUN = 16;
 const int BLOCK = 256 * RUN;
 
 SHARED_ int counts[256];

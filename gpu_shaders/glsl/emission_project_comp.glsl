@@ -4,14 +4,16 @@
  * Two ways, each where it is denser: texels, which carry emitters that fill many of them, and points on the emitters, which carry
  * those that fall between texel centres. Every place on an emitter belongs to one of the two. Texel centres are not random, so
  * weights that mix the two would not sum to one over a small emitter.
- * CANDIDATE_COUNT points lie in order of the emitters and weigh what they would send if nothing stood between; `samples` of them get a
+ * CANDIDATE_COUNT points lie in order of the emitters and weigh what they would send if nothing stood between; RAYS of them get a
  * ray, one each time the running sum of the weights has grown by an equal step. Front, back and every part of a lamp so get their
  * exact share of the rays (systematic resampling; Kitagawa, "Monte Carlo Filter and Smoother", 1996, A.1).
  * probe_layers, 1 element a probe of the dispatch: its layer; its slot is that much after first_slot
- * Dispatch: one group of GROUP threads a probe; each takes a run of candidates; fixed order of summation.
+ * Dispatch: one group of GROUP threads a probe; each weighs a run of candidates; fixed order of summation.
  */
 
 SHARED_ float run_weights[GROUP];
+SHARED_ int run_chosen[GROUP];
+SHARED_ ivec2 chosen_ones[RAYS]; /* candidates that get a ray, and the number of rays that it stands for */
 
 const int RUN = CANDIDATE_COUNT / GROUP;
 
@@ -71,8 +73,10 @@ void main()
   }
   uvec3 key = uvec3(uint(slot.w), 0xB5297A4Du, uint(seed));
   float weights[RUN], run_weight = 0.0;
+  int rays[RUN];
   for (int i = 0; i < RUN; i++) {
     weights[i] = candidate(slot.xyz, key, lane * RUN + i).weight;
+    rays[i] = 0;
     run_weight += weights[i];
   }
   run_weights[lane] = run_weight;
@@ -82,23 +86,33 @@ void main()
     before += i < lane ? run_weights[i] : 0.0;
     total += run_weights[i];
   }
-  float step = total / float(samples);
-  int i = total > 0.0 ? 0 : RUN;
-  while (true) {
-    /* on to the next one that gets rays: few do, and threads that run side by side should trace together */
-    float rays = 0.0;
-    while (i < RUN && rays == 0.0) {
-      float after = before + weights[i++];
-      rays = floor(after / step + 0.5) - floor(before / step + 0.5);
-      before = after;
+  float step = total / float(RAYS);
+  int chosen = 0;
+  for (int i = 0; i < RUN && total > 0.0; i++) {
+    float after = before + weights[i];
+    rays[i] = int(floor(after / step + 0.5) - floor(before / step + 0.5));
+    chosen += rays[i] > 0 ? 1 : 0;
+    before = after;
+  }
+  run_chosen[lane] = chosen;
+  barrier();
+  int place = 0, chosen_count = 0;
+  for (int i = 0; i < GROUP; i++) {
+    place += i < lane ? run_chosen[i] : 0;
+    chosen_count += run_chosen[i];
+  }
+  for (int i = 0; i < RUN; i++) {
+    if (rays[i] > 0 && place < RAYS) {
+      chosen_ones[place++] = ivec2(lane * RUN + i, rays[i]);
     }
-    if (rays == 0.0) {
-      break;
-    }
-    Candidate chosen = candidate(slot.xyz, key, lane * RUN + i - 1);
+  }
+  barrier();
+  /* the nearest lamp may get all rays, and few threads have it in their runs */
+  for (int i = lane; i < min(chosen_count, RAYS); i += GROUP) {
+    Candidate chosen = candidate(slot.xyz, key, chosen_ones[i].x);
     vec3 arriving = light_along(slot.xyz, chosen.direction, chosen.distance * 0.9999, 0);
     if (arriving != vec3(0.0)) {
-      vec3 flux = chosen.radiance * (rays * step / chosen.weight) * arriving;
+      vec3 flux = chosen.radiance * (float(chosen_ones[i].y) * step / chosen.weight) * arriving;
       sh_basis(chosen.direction, basis);
       for (int c = 0; c < COEFFICIENTS; c++) {
         sum[c] += flux * basis[c];

@@ -1,7 +1,7 @@
-/* Finds the cell of each hit in the table; with `found`, enters cells that are missing and lets the lowest of their hits lead.
+/* Finds the cell of each hit in the table, enters cells that are missing and lets the lowest of their hits lead.
  *
  * Dispatch: one thread an entry of `items` (all hits where item_count is negative, hit_count of them); groups of 64. slots: place in the
- * table, −1 where a cell is unknown and not entered.
+ * table, −1 where that is full.
  */
 
 void main()
@@ -22,9 +22,6 @@ void main()
     ivec2 place = element_position(slot);
     uint owner = imageLoad(table, place).x;
     if (owner == 0u) {
-      if (found == 0) {
-        break;
-      }
       owner = imageAtomicCompSwap(table, place, 0u, CLAIM | uint(hit));
       owner = owner == 0u ? CLAIM | uint(hit) : owner;
     }

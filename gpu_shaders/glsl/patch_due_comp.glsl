@@ -10,10 +10,11 @@ void main()
   int block = int(gl_WorkGroupID.x), list = int(gl_WorkGroupID.y);
   int first = block * BLOCK + int(gl_LocalInvocationID.x) * RUN;
   int place = count_before(block);
+  ivec2 selected = count_selected(first);
   if (gl_LocalInvocationID.x == 0u && block == int(gl_NumWorkGroups.x) - 1) {
-    imageStore(due_counts, element_position(result + list), vec4(float(place + int(element(block_counts, block_number(block)).x))));
+    imageStore(due_counts, element_position(result + list), vec4(float(place + counts[255])));
   }
-  place += count_selected(first).y;
+  place += selected.y;
   for (int i = 0; i < RUN; i++) {
     int patch_index = item(first + i);
     if (is_selected(patch_index)) {

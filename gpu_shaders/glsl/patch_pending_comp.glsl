@@ -9,10 +9,11 @@ void main()
   int lane = int(gl_LocalInvocationID.x);
   int first = block * BLOCK + lane * RUN;
   int place = count_before(block);
+  ivec2 selected = count_selected(first);
   if (lane == 0 && block == int(gl_NumWorkGroups.x) - 1) {
-    imageStore(total_out, ivec2(0), vec4(float(place + int(element(block_counts, block).x))));
+    imageStore(total_out, ivec2(0), vec4(float(place + counts[255])));
   }
-  place += count_selected(first).y;
+  place += selected.y;
   for (int i = 0; i < RUN; i++) {
     int hit = item(first + i);
     if (is_selected(hit)) {

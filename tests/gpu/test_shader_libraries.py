@@ -7,7 +7,7 @@ from gridlight.core import bvh, cubemap, direct_light, images, rays, sampling
 from gridlight.core import spherical_harmonics as sh
 from gridlight.core.snapshot import Image
 from gridlight.gpu_shaders import scene_textures, textures
-from gridlight.gpu_shaders.image_textures import send_images
+from gridlight.gpu_shaders.image_textures import kept_or_sent
 from shader_runner import run
 from small_scenes import all_lights, box
 
@@ -218,7 +218,7 @@ def test_direct_light(name):
 def test_images(extension, size):
     generator = np.random.default_rng(3)
     picture = Image("noise", generator.random((size[1], size[0], 4)).astype(np.float32), extension)
-    table, texels = send_images([picture])
+    sent = kept_or_sent([picture])
     places = np.zeros((4000, 4), np.float32)
     places[:, :2] = generator.uniform(-2.5, 2.5, (4000, 2))
     places[:, 2] = generator.choice([0, 0.04, 0.11, 0.23, 0.6, 3.0], 4000)
@@ -229,8 +229,8 @@ def test_images(extension, size):
         inputs={"places": places},
         defines={"HAS_IMAGES": ""},
         textures_2d={
-            "image_table": table,
-            "image_texels": texels,
+            "image_table": sent.table,
+            "image_texels": sent.texels,
             "triangle_corners": textures.upload(np.zeros((1, 4)), "none"),
             "materials": textures.upload(np.zeros((1, 4)), "none"),
             "triangle_attributes": textures.upload(np.zeros((1, 4)), "none"),
