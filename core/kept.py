@@ -12,6 +12,7 @@ import hashlib
 import weakref
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
+from functools import update_wrapper
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -29,6 +30,7 @@ class Kept(Generic[Result]):
     def __init__(self, make: Callable[..., Result], last: int = 2):
         """``last``: so many results, two as a bake reads the scene as renders show it and as the viewport does."""
         self._make, self._last = make, last
+        update_wrapper(self, make)
         self._kept: list[tuple[tuple, Result]] = []  # newest first; replaced, never changed: threads may ask too
 
     def __call__(self, *inputs: Any) -> Result:

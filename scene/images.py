@@ -168,7 +168,8 @@ class ImageTable:
 
     def _interpolated(self, image: bpy.types.Image, interpolation: str, extension: str) -> np.ndarray | None:
         """The pixels of an opaque sRGB image with those between them; None where that makes no difference."""
-        if max(image.size) > MOST_EDGE:  # not even read a second time
+        size: tuple[int, int] = image.size
+        if max(size) > MOST_EDGE:  # not even read a second time
             return None
         encoded = self._encoded(image)
         if encoded.shape[2] == 4 and bool((encoded[..., 3] != 1).any()):
