@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Rays against the boxes around what changed. Reference: core/change_reach.py. */
 
 /* From where to where (t ≥ 0) the way origin + t·direction runs inside the box; nowhere if x > y. */

@@ -1,7 +1,8 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Capture by the layered pass, fragment stage: the same hit record that capture_trace_comp writes.
  *
- * The rasteriser says which triangle covers a texel; where the ray through the texel's centre meets it is computed here. Rasterisers round
- * corners to a 256th of a texel, and what they interpolate is off by as much. */
+ * The rasteriser says which triangle covers a texel; where the ray through the texel's centre meets it is computed
+ * here. Rasterisers round corners to a 256th of a texel, and what they interpolate is off by as much. */
 
 void main()
 {
@@ -21,7 +22,8 @@ void main()
   }
   vec3 offset = direction * (dot(normal, a) / slope) - a;
   vec2 barycentric = vec2(dot(cross(offset, ac), normal), dot(cross(ab, offset), normal)) / squared;
-  vec3 weights = max(vec3(1.0 - barycentric.x - barycentric.y, barycentric), vec3(0.0)); /* covered, but a little outside */
+  /* covered, but a little outside */
+  vec3 weights = max(vec3(1.0 - barycentric.x - barycentric.y, barycentric), vec3(0.0));
   barycentric = weights.yz / (weights.x + weights.y + weights.z);
 #ifdef HAS_UNSEEN
   int flags = int(element(triangle_corners, 3 * index + 1).w); /* see ray_lib */

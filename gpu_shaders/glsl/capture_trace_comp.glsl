@@ -1,7 +1,9 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Capture by rays: one ray through the centre of each texel of each face of a batch of probes.
  *
  * Dispatch: x = columns, y = 6·FACE rows, z = probes of the batch; groups of 8×8×1.
- * Writes hits (triangle, barycentric 1, barycentric 2, unused) into layer probe·6 + face; triangle −1 where nothing is hit.
+ * Writes hits (triangle, barycentric 1, barycentric 2, unused) into layer probe·6 + face; triangle −1 where nothing is
+ * hit.
  */
 
 void main()

@@ -1,8 +1,9 @@
-/* Compaction: entries that `is_selected` picks, in their order. A library before this one says what an entry stands for (`item`, −1 past the
- * end) and which are picked.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Compaction: entries that `is_selected` picks, in their order. A library before this one says what an entry stands for
+ * (`item`, −1 past the end) and which are picked.
  *
- * compact_count_comp counts per block of BLOCK entries, where there is more than one, then a shader places what was picked: 256 threads a block, RUN entries one after the
- * other a thread. Groups of one y make one list.
+ * compact_count_comp counts per block of BLOCK entries, where there is more than one, then a shader places what was
+ * picked: 256 threads a block, RUN entries one after the other a thread. Groups of one y make one list.
  */
 
 const int BLOCK = 256 * RUN;
@@ -15,7 +16,8 @@ int block_number(int block)
   return int(gl_WorkGroupID.y * gl_NumWorkGroups.x) + block;
 }
 
-/* How many of this thread's entries are selected, and how many of the block's before it; counts[255] is then the block's number. */
+/* How many of this thread's entries are selected, and how many of the block's before it; counts[255] is then the
+ * block's number. */
 ivec2 count_selected(int first)
 {
   int lane = int(gl_LocalInvocationID.x);

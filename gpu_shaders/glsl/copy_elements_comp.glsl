@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Copies elements of a linear array.
  *
  * Dispatch: one thread an element; groups of 64. Element i of `source` goes to first + i of `target`.

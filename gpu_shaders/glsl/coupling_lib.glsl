@@ -1,4 +1,6 @@
-/* By how much more, or less, light counts that arrives at grazing angles where gloss is sent in all directions: core/faint_gloss.py. */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* By how much more, or less, light counts that arrives at grazing angles where gloss is sent in all directions:
+ * core/faint_gloss.py. */
 
 vec4 coupling = vec4(0.0, 0.0, 0.0, 1.0); /* of the surface that is being lit, said before light is asked for */
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Cubemap texels. Reference: core/cubemap.py; the faces are drawn in core/conventions.py.
  *
  * The surfaces of a probe are one layer, FACE wide and 6·FACE high: x = column, y = face·FACE + row.

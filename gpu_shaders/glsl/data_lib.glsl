@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Linear arrays of vec4 in 2D textures: element i sits at (i & 4095, i >> 12). Python side: textures.py. */
 
 vec4 element(sampler2D data, int index)

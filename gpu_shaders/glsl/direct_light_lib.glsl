@@ -1,11 +1,12 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Direct light of Blender's lights at a diffuse surface. Units and formulas are Cycles' (tests prove each);
  * reference: core/direct_light.py.
  *
  * lights, 6 elements each (scene_textures.py):
  *   position, kind | color, radius | right, size x | up, size y | back, casts shadow | parameters of the kind, profile
  * With HAS_LINKS twice the light's group is added to whether it casts a shadow.
- * With HAS_PROFILES, after all lights their profiles (core/light_profiles.py), PROFILE_WIDTH × PROFILE_HEIGHT directions and PROFILE_DISTANCES logarithms each;
- * a light's profile is the first element of its own, 0 for none.
+ * With HAS_PROFILES, after all lights their profiles (core/light_profiles.py), PROFILE_WIDTH × PROFILE_HEIGHT
+ * directions and PROFILE_DISTANCES logarithms each; a light's profile is the first element of its own, 0 for none.
  */
 
 #ifdef HAS_PROFILES
@@ -42,7 +43,8 @@ float spot_mask(int light, vec3 towards, vec3 back, vec4 parameters)
 /* What a light's nodes make of the light that goes from it along `direction`, by which it is seen, over `distance`. */
 vec3 profile_factor(int light, int profile, vec3 direction, float distance)
 {
-  vec3 local = -vec3(dot(direction, element(lights, 6 * light + 2).xyz), dot(direction, element(lights, 6 * light + 3).xyz),
+  vec3 local = -vec3(dot(direction, element(lights, 6 * light + 2).xyz),
+                     dot(direction, element(lights, 6 * light + 3).xyz),
                      dot(direction, element(lights, 6 * light + 4).xyz));
   vec2 place = vec2(0.5 - atan(local.y, local.x) * 0.15915494309189535,
                     atan(local.z, length(local.xy)) * 0.3183098861837907 + 0.5);
@@ -73,8 +75,8 @@ LightSample sample_plain_light(int light, vec3 point, vec2 u)
   vec3 t, b;
 
   if (kind == SUN) {
-    /* a cone of radiance strength/(π sin²), so that a facing surface gets exactly the strength; radius is 1 − cos of half the
-     * apparent angle */
+    /* a cone of radiance strength/(π sin²), so that a facing surface gets exactly the strength; radius is 1 − cos of
+     * half the apparent angle */
     tangent_frame(back_shadow.xyz, t, b);
     float cosine = 1.0 - u.x * radius;
     float sine = sqrt(max(1.0 - cosine * cosine, 0.0)), phi = 6.283185307179586 * u.y;
@@ -99,8 +101,8 @@ LightSample sample_plain_light(int light, vec3 point, vec2 u)
       float tangent = sqrt(max(1.0 - cosine * cosine, 0.0)) / max(cosine, 1.0e-6);
       spread = max((parameters.x - tangent) * parameters.y, 0.0);
     }
-    light_sample.irradiance = color_radius.rgb *
-                              (spread * max(cosine, 0.0) * area / max(light_sample.distance * light_sample.distance, 1.0e-20));
+    light_sample.irradiance = color_radius.rgb * (spread * max(cosine, 0.0) * area /
+                                                  max(light_sample.distance * light_sample.distance, 1.0e-20));
     return light_sample;
   }
   float squared = max(dot(to_centre, to_centre), 1.0e-20);
@@ -193,9 +195,11 @@ vec3 numbers_of_lights(int first, int stop, uvec3 key, int index)
   return stop - first > 1 ? sample_r3(own_key, index) : vec3(sample_r2(own_key, index), 0.0);
 }
 
-/* Irradiance of lights `first` .. `stop`: one shadow ray to one of them, chosen by what each sends if nothing stands between (Talbot, Cline and
- * Egbert, "Importance Resampling for Global Illumination", EGSR 2005, with every light a candidate). `direction`: to that one. */
-vec3 lights_irradiance(int first, int stop, vec3 point, vec3 origin, vec3 normal, uvec3 key, int index, out vec3 direction)
+/* Irradiance of lights `first` .. `stop`: one shadow ray to one of them, chosen by what each sends if nothing stands
+ * between (Talbot, Cline and Egbert, "Importance Resampling for Global Illumination", EGSR 2005, with every light a
+ * candidate). `direction`: to that one. */
+vec3 lights_irradiance(
+    int first, int stop, vec3 point, vec3 origin, vec3 normal, uvec3 key, int index, out vec3 direction)
 {
   vec3 numbers = numbers_of_lights(first, stop, key, index);
   float choice = numbers.z;

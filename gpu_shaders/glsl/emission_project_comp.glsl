@@ -1,12 +1,15 @@
-/* What probes see of sampled emitters: the part of the field that no bounce and no lamp changes; field_project_comp adds it. For
- * points on emitters also how that changes where the probe moves (core/gradients.py); field_gradient_comp adds it.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What probes see of sampled emitters: the part of the field that no bounce and no lamp changes; field_project_comp
+ * adds it. For points on emitters also how that changes where the probe moves (core/gradients.py); field_gradient_comp
+ * adds it.
  *
- * Two ways, each where it is denser: texels, which carry emitters that fill many of them, and points on the emitters, which carry
- * those that fall between texel centres. Every place on an emitter belongs to one of the two. Texel centres are not random, so
- * weights that mix the two would not sum to one over a small emitter.
- * CANDIDATE_COUNT points lie in order of the emitters and weigh what they would send if nothing stood between; RAYS of them get a
- * ray, one each time the running sum of the weights has grown by an equal step. Front, back and every part of a lamp so get their
- * exact share of the rays (systematic resampling; Kitagawa, "Monte Carlo Filter and Smoother", 1996, A.1).
+ * Two ways, each where it is denser: texels, which carry emitters that fill many of them, and points on the emitters,
+ * which carry those that fall between texel centres. Every place on an emitter belongs to one of the two. Texel centres
+ * are not random, so weights that mix the two would not sum to one over a small emitter.
+ * CANDIDATE_COUNT points lie in order of the emitters and weigh what they would send if nothing stood between; RAYS of
+ * them get a ray, one each time the running sum of the weights has grown by an equal step. Front, back and every part
+ * of a lamp so get their exact share of the rays (systematic resampling; Kitagawa, "Monte Carlo Filter and Smoother",
+ * 1996, A.1).
  * probe_layers, 1 element a probe of the dispatch: its layer; its slot is that much after first_slot
  * Dispatch: one group of GROUP threads a probe; each weighs a run of candidates; fixed order of summation.
  */
@@ -118,7 +121,8 @@ void main()
         sum[c] += flux * basis[c];
       }
       float cosine = dot(chosen.direction, chosen.normal);
-      vec3 turn = 3.0 * chosen.direction - chosen.normal / (max(abs(cosine), LEAST_COSINE) * (cosine < 0.0 ? -1.0 : 1.0));
+      vec3 turn = 3.0 * chosen.direction -
+                  chosen.normal / (max(abs(cosine), LEAST_COSINE) * (cosine < 0.0 ? -1.0 : 1.0));
       flux /= max(chosen.distance, nearest);
       sh_basis_gradient(chosen.direction, basis, basis_gradient);
       for (int c = 0; c < GRADIENT_COEFFICIENTS; c++) {

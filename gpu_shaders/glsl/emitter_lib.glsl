@@ -1,11 +1,13 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Emissive triangles sampled as lights; which ones and why: core/emitters.py.
  *
- * emitters, 1 element each: triangle, upper end of its share of the total power, probability density per m²; and of as many equal parts of
- * the total power, the emitter in which the part of this number begins: a search has only few to choose from (Chen and Asau, "On Generating
- * Random Variates from an Empirical Distribution", AIIE Transactions 1974).
+ * emitters, 1 element each: triangle, upper end of its share of the total power, probability density per m²; and of as
+ * many equal parts of the total power, the emitter in which the part of this number begins: a search has only few to
+ * choose from (Chen and Asau, "On Generating Random Variates from an Empirical Distribution", AIIE Transactions 1974).
  * After them EMITTER_BOXES boxes (lower, upper corner) that together hold all of them.
- * The candidate that is traced is chosen by resampling (Talbot, Cline and Egbert, "Importance Resampling for Global Illumination", EGSR
- * 2005): CANDIDATES points by power, one of them by what it would send here if nothing stood between.
+ * The candidate that is traced is chosen by resampling (Talbot, Cline and Egbert, "Importance Resampling for Global
+ * Illumination", EGSR 2005): CANDIDATES points by power, one of them by what it would send here if nothing stood
+ * between.
  */
 
 struct EmitterSample {
@@ -72,10 +74,11 @@ EmitterSample sample_emitter(vec3 u)
   return chosen;
 }
 
-/* Share of the light from an emitter `distance` away that points on emitters answer for; directions about the normal answer for the
- * rest. Balance heuristic (Veach and Guibas, SIGGRAPH 1995) of CANDIDATES points and one direction, so no estimate is larger than π·L
- * however near the emitter is; beyond emitter_reach, where directions would hardly find it, points answer for all. So they do where light of
- * the emitter's `group` passes surfaces, at which directions end. */
+/* Share of the light from an emitter `distance` away that points on emitters answer for; directions about the normal
+ * answer for the rest. Balance heuristic (Veach and Guibas, SIGGRAPH 1995) of CANDIDATES points and one direction, so
+ * no estimate is larger than π·L however near the emitter is; beyond emitter_reach, where directions would hardly find
+ * it, points answer for all. So they do where light of the emitter's `group` passes surfaces, at which directions
+ * end. */
 float point_share(int group, float density, float distance, float surface_cosine, float emitter_cosine)
 {
 #ifdef HAS_LINKS
@@ -106,7 +109,8 @@ vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, 
     float surface_cosine = max(dot(direction, normal), 0.0);
     float emitter_cosine = abs(dot(direction, emitter.normal));
     vec3 irradiance = emitter.radiance * (surface_cosine * emitter_cosine / (squared * emitter.density) *
-                                          point_share(emitter.group, emitter.density, distance, surface_cosine, emitter_cosine));
+                                          point_share(emitter.group, emitter.density, distance, surface_cosine,
+                                                      emitter_cosine));
 #ifdef HAS_COUPLING
     irradiance *= coupled(surface_cosine);
 #endif
@@ -121,7 +125,8 @@ vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, 
   if (best_weight == 0.0) {
     return vec3(0.0);
   }
-  /* From where the ray starts, which is not `point`: to an emitter a few centimetres away it would be too long and meet the emitter itself. */
+  /* From where the ray starts, which is not `point`: to an emitter a few centimetres away it would be too long and meet
+   * the emitter itself. */
   vec3 way = best_point - origin;
   float way_length = max(length(way), 1.0e-20);
   vec3 arriving = light_along(origin, way / way_length, way_length * 0.9999, best_group);
@@ -165,7 +170,8 @@ vec3 emitter_direction_irradiance(vec3 origin, vec3 normal, uvec3 key, int index
   vec3 a = element(triangle_corners, 3 * hit.triangle).xyz;
   vec3 across = cross(element(triangle_corners, 3 * hit.triangle + 1).xyz - a,
                       element(triangle_corners, 3 * hit.triangle + 2).xyz - a);
-  float share = point_share(group, density, hit.distance, dot(direction, normal), abs(dot(direction, normalize(across))));
+  float share = point_share(
+      group, density, hit.distance, dot(direction, normal), abs(dot(direction, normalize(across))));
   vec3 arriving = passed_to(origin, direction, hit.distance);
 #ifdef HAS_COUPLING
   arriving *= coupled(dot(direction, normal));

@@ -1,7 +1,9 @@
-/* How the field of each probe changes where the probe moves: from the edges between texels, and `emitted_gradient`, which
- * emission_project_comp found for points on sampled emitters. Formula, sources and reference: core/gradients.py.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* How the field of each probe changes where the probe moves: from the edges between texels, and `emitted_gradient`,
+ * which emission_project_comp found for points on sampled emitters. Formula, sources and reference: core/gradients.py.
  *
- * texel_edges, 2 elements an edge: tangent across it times its length, texel on one side | direction of its middle, texel beyond
+ * texel_edges, 2 elements an edge: tangent across it times its length, texel on one side | direction of its middle,
+ *   texel beyond
  * probe_layers, 1 element a probe of the dispatch: its layer; its slot is that much after first_slot
  * field_gradient, 3 · COEFFICIENTS elements a slot: axis by axis
  * Dispatch: one group of GROUP threads a probe.
@@ -57,7 +59,8 @@ void main()
     barrier();
     for (int c = lane; c < COEFFICIENTS; c += GROUP) {
       int index = (slot * 3 + axis) * COEFFICIENTS + c;
-      imageStore(field_gradient, element_position(index), vec4(group_sum(c) + element(emitted_gradient, index).rgb, 0.0));
+      vec3 sum = group_sum(c) + element(emitted_gradient, index).rgb;
+      imageStore(field_gradient, element_position(index), vec4(sum, 0.0));
     }
   }
 }

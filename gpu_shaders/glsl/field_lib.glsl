@@ -1,6 +1,7 @@
-/* Reading the field: SH of the probes in `field_in`, COEFFICIENTS elements a node, and in `gradient_in` how much they change over one
- * cell along each axis, 3 · TRANSFER_COEFFICIENTS elements a node, axis by axis. Needs spherical_harmonics_lib; grid_info as in
- * lookup_lib. Reference: core/lookup.py.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Reading the field: SH of the probes in `field_in`, COEFFICIENTS elements a node, and in `gradient_in` how much they
+ * change over one cell along each axis, 3 · TRANSFER_COEFFICIENTS elements a node, axis by axis. Needs
+ * spherical_harmonics_lib; grid_info as in lookup_lib. Reference: core/lookup.py.
  */
 
 vec3 coefficient_at(int node, int index, vec3 step)
@@ -14,8 +15,8 @@ vec3 coefficient_at(int node, int index, vec3 step)
   return value;
 }
 
-/* Irradiance at `normal` of the field, blended over the corners of a cell, each led to the point by its gradient: see lookup_cell.
- * May be negative where the series rings. */
+/* Irradiance at `normal` of the field, blended over the corners of a cell, each led to the point by its gradient: see
+ * lookup_cell. May be negative where the series rings. */
 vec3 field_irradiance(int first_node, vec4 weights0, vec4 weights1, vec4 lead, vec3 normal)
 {
   ivec3 resolution = ivec3(grid_info[3].xyz);

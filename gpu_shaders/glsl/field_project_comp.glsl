@@ -1,5 +1,6 @@
-/* Outgoing radiance of every texel (emission that is not sampled + albedo/π · irradiance of its patch), projected to SH, and
- * `emitted`, what emission_project_comp found of sampled emitters.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Outgoing radiance of every texel (emission that is not sampled + albedo/π · irradiance of its patch), projected to
+ * SH, and `emitted`, what emission_project_comp found of sampled emitters.
  *
  * With own_texels the irradiance of texel i of the dispatch's probe p is element p · 6 · FACE² + i.
  * probe_layers, 1 element a probe of the dispatch: its layer; its slot is that much after first_slot

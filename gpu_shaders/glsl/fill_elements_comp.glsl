@@ -1,4 +1,6 @@
-/* Sets elements first .. first + count of a linear array to `value`, with TIMES taken times element `factor` of `factors`.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Sets elements first .. first + count of a linear array to `value`, with TIMES taken times element `factor` of
+ * `factors`.
  *
  * Dispatch: one thread an element; groups of 64.
  */

@@ -1,7 +1,9 @@
-/* Glossy surfaces: a mirrored part by GGX facets beside the diffuse one. Formulas, sources and reference: core/gloss.py.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Glossy surfaces: a mirrored part by GGX facets beside the diffuse one. Formulas, sources and reference:
+ * core/gloss.py.
  *
- * gloss_rows, 2 elements a material: share of what is sent back that is mirrored, α | reflectance of facets that are seen face on, 1 where the
- * share is one of the light, whatever is sent back
+ * gloss_rows, 2 elements a material: share of what is sent back that is mirrored, α | reflectance of facets that are
+ * seen face on, 1 where the share is one of the light, whatever is sent back
  */
 
 const float LEAST_FACET_COSINE = 1.0e-4;
@@ -78,7 +80,8 @@ float hidden_facets(float cosine, float alpha)
 vec3 triangle_normal(int triangle, vec3 view)
 {
   vec3 a = element(triangle_corners, 3 * triangle).xyz;
-  vec3 across = cross(element(triangle_corners, 3 * triangle + 1).xyz - a, element(triangle_corners, 3 * triangle + 2).xyz - a);
+  vec3 across = cross(element(triangle_corners, 3 * triangle + 1).xyz - a,
+                      element(triangle_corners, 3 * triangle + 2).xyz - a);
   return normalize(dot(across, view) < 0.0 ? -across : across);
 }
 
@@ -109,7 +112,8 @@ Reflection reflect_at(Gloss gloss, Surface surface, int triangle, vec3 view, uve
   return reflection;
 }
 
-/* Radiance sent to the view per unit of radiance and solid angle from `towards`, cosine included, by a lobe of width `alpha`. */
+/* Radiance sent to the view per unit of radiance and solid angle from `towards`, cosine included, by a lobe of width
+ * `alpha`. */
 vec3 gloss_lobe(Gloss gloss, Surface surface, vec3 view, vec3 towards, float alpha)
 {
   float arriving = dot(towards, surface.normal);
@@ -127,8 +131,8 @@ vec3 gloss_lobe(Gloss gloss, Surface surface, vec3 view, vec3 towards, float alp
   return mirrored_by_facet(gloss, surface.albedo, dot(view, middle)) * (spread / (masking * 4.0 * leaving * single));
 }
 
-/* Of the light of a lamp of so many steradians, or of an emitter of which each point stands for so many, what points answer for where the
- * lobe is of this `width` α. */
+/* Of the light of a lamp of so many steradians, or of an emitter of which each point stands for so many, what points
+ * answer for where the lobe is of this `width` α. */
 float share_of_points_on(float extent, float width)
 {
   float lobe = 12.566370614359172 * width * width;

@@ -1,4 +1,6 @@
-/* Lamps and sampled emitters as glossy surfaces see them: met by mirrored rays, and by points on them, each to its share.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Lamps and sampled emitters as glossy surfaces see them: met by mirrored rays, and by points on them, each to its
+ * share.
  *
  * Reference: core/reference_gloss.py. A lamp is met where sample_plain_light would have put a sample.
  */
@@ -13,7 +15,8 @@ float lamp_extent(int light, vec3 point)
   }
   float area = 3.141592653589793 * radius * radius;
   if (kind >= RECTANGLE) {
-    area = element(lights, 6 * light + 2).w * element(lights, 6 * light + 3).w * (kind == ELLIPSE ? 0.7853981633974483 : 1.0);
+    area = element(lights, 6 * light + 2).w * element(lights, 6 * light + 3).w *
+           (kind == ELLIPSE ? 0.7853981633974483 : 1.0);
   }
   vec3 to_centre = element(lights, 6 * light).xyz - point;
   return area / max(dot(to_centre, to_centre), 1.0e-20);
@@ -89,7 +92,8 @@ vec3 lamp_met(int light, vec3 point, vec3 direction, float limit)
   return radiance;
 }
 
-/* Radiance of all lamps along a ray that ends at `limit` and was mirrored in a lobe of this width, by the share that rays answer for. */
+/* Radiance of all lamps along a ray that ends at `limit` and was mirrored in a lobe of this width, by the share that
+ * rays answer for. */
 vec3 lamps_met(vec3 point, vec3 direction, float limit, float width)
 {
   vec3 sum = vec3(0.0);
@@ -107,7 +111,8 @@ vec3 lamps_met(vec3 point, vec3 direction, float limit, float width)
   return sum;
 }
 
-/* Radiance that a glossy surface sends to `view` by light of points on lamps: sample `index` of the sequences of `key`. */
+/* Radiance that a glossy surface sends to `view` by light of points on lamps: sample `index` of the sequences of
+ * `key`. */
 vec3 lamps_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float width, uvec3 key, int index)
 {
   vec3 sum = vec3(0.0);
@@ -127,14 +132,15 @@ vec3 lamps_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float 
       continue;
     }
     bool shadow = (int(element(lights, 6 * light + 4).w) & 1) != 0;
-    sum += shadow ? radiance * light_along(origin, light_sample.direction, light_sample.distance * 0.9999, group) : radiance;
+    sum += shadow ? radiance * light_along(origin, light_sample.direction, light_sample.distance * 0.9999, group) :
+                    radiance;
   }
   return sum;
 }
 
 #ifdef HAS_EMITTERS
-/* Steradians that each of CANDIDATES points on an emitter of the `group` stands for; 0 where points answer for all, as light of the group passes
- * surfaces, at which rays end. */
+/* Steradians that each of CANDIDATES points on an emitter of the `group` stands for; 0 where points answer for all, as
+ * light of the group passes surfaces, at which rays end. */
 float emitter_extent(int group, float density, float distance, float emitter_cosine)
 {
 #ifdef HAS_LINKS

@@ -1,5 +1,6 @@
-/* Sums over the threads of a group, in fixed order, so that two runs give the same bytes. SUMS at a time: every thread writes its
- * share of sum i to partial_sums[i · GROUP + lane], then a barrier, then group_sum(i). */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Sums over the threads of a group, in fixed order, so that two runs give the same bytes. SUMS at a time: every thread
+ * writes its share of sum i to partial_sums[i · GROUP + lane], then a barrier, then group_sum(i). */
 
 SHARED_ vec4 partial_sums[SUMS * GROUP];
 

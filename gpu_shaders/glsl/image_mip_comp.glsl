@@ -1,6 +1,9 @@
-/* One mip level of an image from the one before: means over equal parts, sizes halved and rounded down. Reference: core/images.py.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* One mip level of an image from the one before: means over equal parts, sizes halved and rounded down. Reference:
+ * core/images.py.
  *
- * Dispatch: one thread a texel; groups of 64. Levels are linear arrays of their own rows, one after the other in `texels`.
+ * Dispatch: one thread a texel; groups of 64. Levels are linear arrays of their own rows, one after the other in
+ * `texels`.
  */
 
 void main()

@@ -1,7 +1,8 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Texels of an image as half floats, from `first` on; what half floats cannot hold is cut off.
  *
- * Dispatch: one thread a texel; groups of 64. Some drivers cut digits off where they store half floats, which would darken every image, so
- * texels are rounded (to nearest, ties to even) before.
+ * Dispatch: one thread a texel; groups of 64. Some drivers cut digits off where they store half floats, which would
+ * darken every image, so texels are rounded (to nearest, ties to even) before.
  */
 
 void main()

@@ -1,5 +1,6 @@
-/* Takes texel surfaces over from one set of layers to another: layer z of the new one comes from layer from_layer[z].x of the old
- * one, or is left alone where that is negative.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Takes texel surfaces over from one set of layers to another: layer z of the new one comes from layer from_layer[z].x
+ * of the old one, or is left alone where that is negative.
  *
  * Dispatch: x = columns, y = 6·FACE rows, z = layers of the new set; groups of 8×8×1.
  */

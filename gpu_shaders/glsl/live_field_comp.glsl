@@ -1,7 +1,10 @@
-/* Leads the field that pictures show to what probes have by now: a share of the way for coefficients and gradients of all slots.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Leads the field that pictures show to what probes have by now: a share of the way for coefficients and gradients of
+ * all slots.
  *
- * target_field, COEFFICIENTS elements a slot; target_gradient, 3 · TRANSFER_COEFFICIENTS elements a slot, per metre along the world's
- * axes, not limited. field and gradient: as field_lib reads them, by node, over one cell along the grid's axes.
+ * target_field, COEFFICIENTS elements a slot; target_gradient, 3 · TRANSFER_COEFFICIENTS elements a slot, per metre
+ * along the world's axes, not limited. field and gradient: as field_lib reads them, by node, over one cell along the
+ * grid's axes.
  * cell_info, 3 elements: one cell along each axis of the grid, metres; 0 where it has no cell
  * Dispatch: one thread a coefficient of a slot; groups of 64. Twins: core/gradients.py, per_cell and limited.
  */

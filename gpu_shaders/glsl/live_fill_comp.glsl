@@ -1,4 +1,6 @@
-/* Light of nodes without light of their own: one sweep towards the mean of their neighbours, as core/dilation.py does many.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Light of nodes without light of their own: one sweep towards the mean of their neighbours, as core/dilation.py does
+ * many.
  *
  * fill_nodes, 2 elements a node: neighbours along the axes, −1 past the edge (0..5), the node itself (6)
  * Dispatch: one thread a coefficient of such a node; groups of 64. Neighbours may be of this sweep or the one before.

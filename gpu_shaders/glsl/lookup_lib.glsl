@@ -1,6 +1,8 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The field's lookup: trilinear between the eight probes of a cell, weighted by whether each probe sees the point.
- * Reference and reasons: core/lookup.py. Chebyshev's inequality for visibility: Donnelly and Lauritzen, "Variance Shadow Maps",
- * I3D 2006; in probe grids: Majercik et al., "Dynamic Diffuse Global Illumination with Ray-Traced Irradiance Fields", JCGT 2019.
+ * Reference and reasons: core/lookup.py. Chebyshev's inequality for visibility: Donnelly and Lauritzen, "Variance
+ * Shadow Maps", I3D 2006; in probe grids: Majercik et al., "Dynamic Diffuse Global Illumination with Ray-Traced
+ * Irradiance Fields", JCGT 2019.
  *
  * grid_info: rows of world-to-lattice (0..2); resolution, depth clamp (3); visibility bias, least deviation (4)
  * grid_nodes, 1 element a node: capture position, slot of an active probe, −1 culled, −2 invalid
@@ -41,7 +43,8 @@ vec2 sample_inverse(int slot, vec3 direction)
   ivec2 corner = ivec2(floor(position));
   vec2 blend = position - vec2(corner);
   return mix(mix(fetch_inverse(slot, corner), fetch_inverse(slot, corner + ivec2(1, 0)), blend.x),
-             mix(fetch_inverse(slot, corner + ivec2(0, 1)), fetch_inverse(slot, corner + ivec2(1, 1)), blend.x), blend.y);
+             mix(fetch_inverse(slot, corner + ivec2(0, 1)), fetch_inverse(slot, corner + ivec2(1, 1)), blend.x),
+             blend.y);
 }
 
 /* How likely the probe in `slot` sees `point`, 0..1. */
@@ -82,9 +85,9 @@ ivec3 first_corner(vec3 lattice)
   return min(ivec3(lattice), max(ivec3(grid_info[3].xyz) - 2, ivec3(0)));
 }
 
-/* First corner of the cell around `point` and the weights of its eight corners (x fastest), which sum to 1. `lead`: cells for which
- * the gradient of the first corner is followed, half a step less for every step to another corner; share of the trilinear blend that
- * visibility left. */
+/* First corner of the cell around `point` and the weights of its eight corners (x fastest), which sum to 1. `lead`:
+ * cells for which the gradient of the first corner is followed, half a step less for every step to another corner;
+ * share of the trilinear blend that visibility left. */
 ivec3 lookup_cell(vec3 point, vec3 normal, out float weights[8], out vec4 lead)
 {
   vec3 beyond;

@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-/* How fast the device multiplies and adds: 4 independent vec4 a thread, 32 operations each of `rounds`, one store at the end.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* How fast the device multiplies and adds: 4 independent vec4 a thread, 32 operations each of `rounds`, one store at
+ * the end.
  *
  * Dispatch: one thread a texel; groups of 16×16. `factor` must be unknown to the compiler.
  */

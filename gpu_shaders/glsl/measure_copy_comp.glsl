@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* How fast the device moves memory: copies an image, 32 bytes a thread.
  *
  * Dispatch: one thread a texel; groups of 16×16.

@@ -1,7 +1,9 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Which objects a probe sees, from which side and whether lit: 8×8 texels of each face, for core/orientation.py.
  *
- * Dispatch: one group of 96 threads a probe of the batch; each writes four texels: ±(object + 1), negative from behind, half a unit
- * farther from zero where light arrives or leaves; 0 background. Needs geometry, emission and patches with direct light.
+ * Dispatch: one group of 96 threads a probe of the batch; each writes four texels: ±(object + 1), negative from behind,
+ * half a unit farther from zero where light arrives or leaves; 0 background. Needs geometry, emission and patches with
+ * direct light.
  */
 
 void main()

@@ -1,5 +1,6 @@
-/* The octahedral map of directions (Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors", JCGT 2014)
- * and normals packed into one number. Reference: core/cubemap.py.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The octahedral map of directions (Cigolle et al., "A Survey of Efficient Representations for Independent Unit
+ * Vectors", JCGT 2014) and normals packed into one number. Reference: core/cubemap.py.
  */
 
 vec3 octahedral_decode(vec2 uv)

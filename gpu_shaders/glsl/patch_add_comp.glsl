@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Adds TERMS arrays to `total`, or begins with their sum; in their order.
  *
  * Dispatch: one thread a patch; groups of 64.

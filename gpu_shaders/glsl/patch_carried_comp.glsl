@@ -1,6 +1,8 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Irradiance of what the rays of each patch brought along.
  *
- * Dispatch: one thread a patch from first_patch on; groups of 64. `carried` counts rays from the first one of first_patch.
+ * Dispatch: one thread a patch from first_patch on; groups of 64. `carried` counts rays from the first one of
+ * first_patch.
  */
 
 void main()

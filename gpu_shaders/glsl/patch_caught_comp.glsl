@@ -1,9 +1,11 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Finds rays that keep light among a handful of patches for ever, and takes it away with the first of them.
  *
- * In a slit all rays of a patch end on the one across, and all of that one's back on it: none of so few found the way out. Between white
- * walls light would add up there without end, so one ray of each counts as lost, as if the next had gone astray.
- * Dispatch: one thread a patch; groups of 64. Only first rays are written, and only by their own patch; others look at the rest, so it does
- * not matter who comes first. Reference: core/patches.py, caught.
+ * In a slit all rays of a patch end on the one across, and all of that one's back on it: none of so few found the way
+ * out. Between white walls light would add up there without end, so one ray of each counts as lost, as if the next had
+ * gone astray.
+ * Dispatch: one thread a patch; groups of 64. Only first rays are written, and only by their own patch; others look at
+ * the rest, so it does not matter who comes first. Reference: core/patches.py, caught.
  */
 
 void main()

@@ -1,10 +1,13 @@
-/* Cells of patches: which one a hit lies in, and the table that tells which patch a cell has. Reference: core/patches.py.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Cells of patches: which one a hit lies in, and the table that tells which patch a cell has. Reference:
+ * core/patches.py.
  *
  * A cell's key is (place x, y, z; number of sheet, level, facing and variant), whole numbers that floats hold exactly.
  *
- * The table has open addresses: an entry of `table` is 0 (free), the number of a patch + 1, or CLAIM + the number of a hit of the bind in
- * hand whose cell has no patch yet. Which hit claims an entry first depends on the driver; which patch a cell gets does not: its leader is
- * the lowest hit (`leaders`), and patches are numbered in the order of their leaders.
+ * The table has open addresses: an entry of `table` is 0 (free), the number of a patch + 1, or CLAIM + the number of a
+ * hit of the bind in hand whose cell has no patch yet. Which hit claims an entry first depends on the driver; which
+ * patch a cell gets does not: its leader is the lowest hit (`leaders`), and patches are numbered in the order of their
+ * leaders.
  */
 
 const uint CLAIM = 0x80000000u;

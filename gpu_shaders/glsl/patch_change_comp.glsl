@@ -1,8 +1,10 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* How far iterations are apart: sums over the patches that probes see, of the last three irradiances.
  *
- * Dispatch: groups of THREADS, each a share of the patches; fixed order of summation. Writes three elements a group, from `result` on:
- * |new|², |new − old|², (new − old)·(old − older), luminance, all of irradiance times a scale, so that squares of 1e-30 and of 1e30 both fit |
- * number of patches, of slow patches, |new|² and |what is still to come|² of the others | that scale.
+ * Dispatch: groups of THREADS, each a share of the patches; fixed order of summation. Writes three elements a group,
+ * from `result` on: |new|², |new − old|², (new − old)·(old − older), luminance, all of irradiance times a scale, so
+ * that squares of 1e-30 and of 1e30 both fit | number of patches, of slow patches, |new|² and |what is still to come|²
+ * of the others | that scale.
  */
 
 const int AT_ONCE = 4; /* patches of a thread that are on their way from memory together */
@@ -42,7 +44,8 @@ void main()
       float weight = first + k * THREADS < patch_count ? max(element(patch_seen, i).x, unseen) : 0.0;
       float open = is_slow(fresh, change, last_change) ? 0.0 : weight;
       others += vec4(weight, weight - open, open * dot(fresh, fresh), open * tail_squared(change, last_change));
-      sum += weight * vec4(dot(fresh, fresh), dot(change, change), dot(change, last_change), dot(fresh, vec3(0.2126, 0.7152, 0.0722)));
+      sum += weight * vec4(dot(fresh, fresh), dot(change, change), dot(change, last_change),
+                           dot(fresh, vec3(0.2126, 0.7152, 0.0722)));
     }
   }
   sum = sum_of_group(sum, lane);

@@ -1,7 +1,8 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Finds the cell of each hit in the table, enters cells that are missing and lets the lowest of their hits lead.
  *
- * Dispatch: one thread an entry of `items` (all hits where item_count is negative, hit_count of them); groups of 64. slots: place in the
- * table, −1 where that is full.
+ * Dispatch: one thread an entry of `items` (all hits where item_count is negative, hit_count of them); groups of 64.
+ * slots: place in the table, −1 where that is full.
  */
 
 void main()

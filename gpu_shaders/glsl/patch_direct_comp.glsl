@@ -1,10 +1,13 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Direct light of patches: irradiance of lamps and sampled emitters at `samples` places spread over the patch's points.
  *
- * Dispatch: a thread for samples_each of the samples of a patch, see patch_lists_lib; groups of 64. patch_mean_comp puts them together.
- * (A thread for all samples of a patch would be simpler, but software drivers end every loop of a thread that has gone round 65 535 times.)
- * Fewer samples than points take one of each equal run of points, all the same one of their runs, which is random.
- * The key of a number is (first_key + patch, light, seed); its index counts samples, so the points of a patch share one stratified sequence.
- * patch_points, POINTS elements a patch: position, packed normal. patches: index of a patch in x. sheet_numbers: of each patch.
+ * Dispatch: a thread for samples_each of the samples of a patch, see patch_lists_lib; groups of 64. patch_mean_comp
+ * puts them together. (A thread for all samples of a patch would be simpler, but software drivers end every loop of a
+ * thread that has gone round 65 535 times.) Fewer samples than points take one of each equal run of points, all the
+ * same one of their runs, which is random. The key of a number is (first_key + patch, light, seed); its index counts
+ * samples, so the points of a patch share one stratified sequence.
+ * patch_points, POINTS elements a patch: position, packed normal. patches: index of a patch in x. sheet_numbers: of
+ * each patch.
  * couplings: of each patch, see coupling_lib.
  */
 
@@ -20,7 +23,8 @@ vec3 irradiance_of_side(vec3 point, vec3 normal, uvec3 key, int index)
 
 void main()
 {
-  /* Groups come from both ends in turn: software drivers give each core one run of them, and the lists differ in work. */
+  /* Groups come from both ends in turn: software drivers give each core one run of them, and the lists differ in
+   * work. */
   int group = LINEAR_THREAD / 64;
   int from_end = int(gl_NumWorkGroups.x * gl_NumWorkGroups.y) - 1 - group / 2;
   int thread_number = 64 * (group % 2 == 0 ? group / 2 : from_end) + int(gl_LocalInvocationID.x);

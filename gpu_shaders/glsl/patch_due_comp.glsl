@@ -1,8 +1,9 @@
-/* Lists patches that are due, see patch_due_lib, and notes the number of samples that they get. Nobody waits for that note: a patch is due
- * for one list at most, whatever the note says.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Lists patches that are due, see patch_due_lib, and notes the number of samples that they get. Nobody waits for that
+ * note: a patch is due for one list at most, whatever the note says.
  *
- * Dispatch: one group of 256 threads a block; y = lists, patch_count elements of `due` each. Elements of `due_counts` from `result` on are
- * their lengths.
+ * Dispatch: one group of 256 threads a block; y = lists, patch_count elements of `due` each. Elements of `due_counts`
+ * from `result` on are their lengths.
  */
 
 void main()

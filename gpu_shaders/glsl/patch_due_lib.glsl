@@ -1,8 +1,9 @@
-/* Patches that are due to be lit by a part of the light, see compaction_lib: those that should have another number of samples than they
- * have, a list for each number. How many they should have: core/patches.py, direct_samples.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Patches that are due to be lit by a part of the light, see compaction_lib: those that should have another number of
+ * samples than they have, a list for each number. How many they should have: core/patches.py, direct_samples.
  *
- * spread: mean and standard deviation of one sample, if nothing stood between; lights and mean_lights: the mean that all parts send to the
- * patch and to all patches.
+ * spread: mean and standard deviation of one sample, if nothing stood between; lights and mean_lights: the mean that
+ * all parts send to the patch and to all patches.
  */
 
 int item(int entry)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Adds the bounces still to come where they shrink by a constant ratio: irradiance += factor · (irradiance − old).
  *
  * Dispatch: one thread a patch; groups of 64. Aitken's delta-squared process on the dominant mode.

@@ -1,7 +1,9 @@
-/* One bounce between patches: irradiance = direct + brought along + mean over rays of (albedo · irradiance where the ray ended).
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* One bounce between patches: irradiance = direct + brought along + mean over rays of (albedo · irradiance where the
+ * ray ended).
  *
- * Rays are cosine-weighted, so π·mean(radiance) is the irradiance and π cancels against albedo/π. Ends that lie on no patch are left
- * out of the mean: the row sums of the transport stay right, a furnace stays a furnace.
+ * Rays are cosine-weighted, so π·mean(radiance) is the irradiance and π cancels against albedo/π. Ends that lie on no
+ * patch are left out of the mean: the row sums of the transport stay right, a furnace stays a furnace.
  * Dispatch: one thread a patch; groups of 64. ray_ends: −1 no patch, −2 nothing comes back.
  * Reference: core/reference_light.py, bounce.
  */

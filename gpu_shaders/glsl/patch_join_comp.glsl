@@ -1,10 +1,12 @@
-/* Hits join the patch of their cell if they see its leader; that keeps a cell which a wall cuts in two from becoming one patch.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Hits join the patch of their cell if they see its leader; that keeps a cell which a wall cuts in two from becoming
+ * one patch.
  *
- * A texel that sees none of the VARIANTS leaders in its cell shows the last one's light, as it has to show some, but is no point of it; a
- * ray is left out of the mean of its patch.
+ * A texel that sees none of the VARIANTS leaders in its cell shows the last one's light, as it has to show some, but is
+ * no point of it; a ray is left out of the mean of its patch.
  *
- * Dispatch: as patch_claim_comp. Who joins a patch of this bind competes for one of its points: the lowest of the hits' scrambled numbers
- * wins (`candidates`). Reference: core/patches.py.
+ * Dispatch: as patch_claim_comp. Who joins a patch of this bind competes for one of its points: the lowest of the hits'
+ * scrambled numbers wins (`candidates`). Reference: core/patches.py.
  */
 
 void main()

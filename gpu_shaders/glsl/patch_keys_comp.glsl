@@ -1,12 +1,14 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Key of the cell that each hit lies in, see patch_cell_lib; and which hits ask for a patch.
  *
- * Dispatch: one thread a hit; groups of 64. With HAS_VIEW the hits are texels of probes from first_slot on, TEXELS each, and near ones get
- * finer cells. With only_lost, hits ask that have none after a search. cell_rule: three rows of the matrix to the volume's box, half
- * its edge in w; edge of plain cells, the finest cells against it, shift of cells, angle;
- * the box's middle.
+ * Dispatch: one thread a hit; groups of 64. With HAS_VIEW the hits are texels of probes from first_slot on, TEXELS
+ * each, and near ones get finer cells. With only_lost, hits ask that have none after a search. cell_rule: three rows of
+ * the matrix to the volume's box, half its edge in w; edge of plain cells, the finest cells against it, shift of cells,
+ * angle; the box's middle.
  */
 
-/* Number 0 … 26 of the one among 26 directions (axes, edges and corners of a cube) that is nearest to a packed normal. */
+/* Number 0 … 26 of the one among 26 directions (axes, edges and corners of a cube) that is nearest to a packed
+ * normal. */
 float facing(float packed_normal)
 {
   float high = floor(packed_normal / 4096.0);

@@ -1,5 +1,7 @@
-/* Lists of patches that get direct light, up to LISTS of them: entries list_first … list_first + list_count of `patches` get list_samples
- * samples each, in runs of samples_each, a thread a run. patch_direct_comp and patch_mean_comp walk them in the same order.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Lists of patches that get direct light, up to LISTS of them: entries list_first … list_first + list_count of
+ * `patches` get list_samples samples each, in runs of samples_each, a thread a run. patch_direct_comp and
+ * patch_mean_comp walk them in the same order.
  */
 
 const int LISTS = 4;

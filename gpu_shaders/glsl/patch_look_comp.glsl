@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Hits join a patch that their cell has, the first whose leader they see; NO_PATCH where there is none.
  *
  * Dispatch: one thread a hit; groups of 64. Nobody founds a patch meanwhile. Reference: core/patches.py.

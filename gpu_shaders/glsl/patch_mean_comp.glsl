@@ -1,5 +1,6 @@
-/* Adds to `direct` of each patch of the lists of patch_lists_lib, or begins it with, the mean over its samples, whose sums by runs of them
- * patch_direct_comp left.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Adds to `direct` of each patch of the lists of patch_lists_lib, or begins it with, the mean over its samples, whose
+ * sums by runs of them patch_direct_comp left.
  *
  * Dispatch: one thread an entry of the lists; groups of 64.
  */

@@ -1,4 +1,6 @@
-/* Numbers new patches in the order of their leaders and enters them in the table; second step of a compaction, see compaction_lib.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Numbers new patches in the order of their leaders and enters them in the table; second step of a compaction, see
+ * compaction_lib.
  *
  * Dispatch: one group of 256 threads a block. total_in, total_out: number of patches before and after.
  */

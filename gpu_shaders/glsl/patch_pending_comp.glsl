@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Lists the hits that are still without a patch, in order; second step of a compaction, see compaction_lib.
  *
  * Dispatch: one group of 256 threads a block.

@@ -1,4 +1,6 @@
-/* What compactions of a bind pick, see compaction_lib: hits without a patch; with LEADERS, those of them that lead a new one. */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What compactions of a bind pick, see compaction_lib: hits without a patch; with LEADERS, those of them that lead a
+ * new one. */
 
 int item(int entry)
 {

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Points of new patches: the leader, then the hits that won a place, evenly.
  *
  * Dispatch: one thread a patch from first_new on; groups of 64.
@@ -21,7 +22,8 @@ void main()
   }
   for (int i = POINTS - 1; i > 0; i--) {
     int from = i * count / POINTS;
-    vec4 point = from == 0 ? imageLoad(patch_points, element_position(patch_index * POINTS)) : element(hits, chosen[from]);
+    vec4 point = from == 0 ? imageLoad(patch_points, element_position(patch_index * POINTS)) :
+                             element(hits, chosen[from]);
     imageStore(patch_points, element_position(patch_index * POINTS + i), point);
   }
 }

@@ -1,9 +1,12 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Rays that leave patches: where they end, what part of the light there comes back, and what light they bring along.
  *
- * Dispatch: one thread a ray from first_ray on, rays_each a patch; groups of 64. Directions are cosine-weighted (Malley), stratified over the
- * patch; with SEGMENTS above 1 a ray goes on as a path, and direct light is sampled where it bounces.
- * Writes for each ray, counted from first_ray but for `reflected`: hits (position, packed normal; −1 where nothing more can come), `carried` (emission that points
- * on emitters do not answer for, or the world, and direct light at the bounces) and `reflected` (product of the albedos on the way).
+ * Dispatch: one thread a ray from first_ray on, rays_each a patch; groups of 64. Directions are cosine-weighted
+ * (Malley), stratified over the patch; with SEGMENTS above 1 a ray goes on as a path, and direct light is sampled where
+ * it bounces.
+ * Writes for each ray, counted from first_ray but for `reflected`: hits (position, packed normal; −1 where nothing more
+ * can come), `carried` (emission that points on emitters do not answer for, or the world, and direct light at the
+ * bounces) and `reflected` (product of the albedos on the way).
  * With HAS_GLOSS each of these ways goes on where it is mirrored, until it meets something diffuse.
  * Of patches on sheets every second ray leaves from the back; `hit_sheets` are those that rays end on.
  */
@@ -102,7 +105,8 @@ void main()
       if (through != vec3(0.0)) {
         vec3 behind = step_off(surface.position, -normal, direction, hit.distance);
         uvec3 back_key = light_key + uvec3(0u, BACK_STREAM, 0u);
-        irradiance = (1.0 - through) * irradiance + through * irradiance_at(surface.position, behind, -normal, back_key, number);
+        irradiance = (1.0 - through) * irradiance +
+                     through * irradiance_at(surface.position, behind, -normal, back_key, number);
         crosses = (pcg3d(key + uvec3(uint(number), SIDE_STREAM + uint(segment), 0u)).x & 1u) != 0u;
         normal = crosses ? -normal : normal;
         origin = crosses ? behind : origin;

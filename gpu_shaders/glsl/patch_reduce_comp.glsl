@@ -1,5 +1,6 @@
-/* One number for a range of patches: the sum of the first channel of `values`, or with LARGEST the largest of its colours after adding
- * those of `others`.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* One number for a range of patches: the sum of the first channel of `values`, or with LARGEST the largest of its
+ * colours after adding those of `others`.
  *
  * Dispatch: one group of THREADS; fixed order of summation. Writes element `result` of `results`.
  */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Marks the patches that texels of some probes lie on; with REFLECTIONS also those that they mirror.
  *
  * Dispatch: one group of 64 threads a probe. probe_layers, 1 element a probe of the dispatch: its layer.

@@ -1,5 +1,6 @@
-/* Lines of sight between hits and leaders of patches (position, packed normal). Both ends are raised off the surface, so that a curved one
- * does not hide its own parts; obstacles lower than that do not count. */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Lines of sight between hits and leaders of patches (position, packed normal). Both ends are raised off the surface,
+ * so that a curved one does not hide its own parts; obstacles lower than that do not count. */
 
 const float RAISE = 0.15; /* of the distance between the two */
 

@@ -1,10 +1,11 @@
-/* How unevenly lamps and sampled emitters light the points of each patch if nothing stands between: what decides how many of them get
- * shadow rays.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* How unevenly lamps and sampled emitters light the points of each patch if nothing stands between: what decides how
+ * many of them get shadow rays.
  *
- * Some points tell it well enough (core/patches.py: spread_points). Points on emitters are random themselves, but a sample's candidates average that (emitter_lib.glsl): two at each place tell the two
- * variances apart.
- * Dispatch: one thread a patch from first_patch on; groups of 64. Writes mean and standard deviation of the luminance of one sample's
- * irradiance.
+ * Some points tell it well enough (core/patches.py: spread_points). Points on emitters are random themselves, but a
+ * sample's candidates average that (emitter_lib.glsl): two at each place tell the two variances apart.
+ * Dispatch: one thread a patch from first_patch on; groups of 64. Writes mean and standard deviation of the luminance
+ * of one sample's irradiance.
  */
 
 const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);

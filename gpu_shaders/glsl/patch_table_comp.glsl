@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Enters patches that are known in an empty table.
  *
  * Dispatch: one thread a patch; groups of 64.

@@ -1,7 +1,8 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* How the surfaces at places that light is measured at take light of grazing angles, see coupling_lib.
  *
- * Dispatch: one thread for each of place_count patches or texels from first_place on, of which the first point is asked; groups of 64. The
- * surface is looked for right below the point, where the ray that found it left it.
+ * Dispatch: one thread for each of place_count patches or texels from first_place on, of which the first point is
+ * asked; groups of 64. The surface is looked for right below the point, where the ray that found it left it.
  */
 
 void main()

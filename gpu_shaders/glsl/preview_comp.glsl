@@ -1,8 +1,11 @@
-/* The scene as the field lights it, without a window: camera rays and what viewport_shade_lib shows of what they hit, and probe spheres.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The scene as the field lights it, without a window: camera rays and what viewport_shade_lib shows of what they hit,
+ * and probe spheres.
  *
- * Dispatch: one thread a pixel, one sample each; groups of 64: of the pixels in `chosen` (their numbers, row by row from the bottom), or where
- * chosen_count is −1 of all, in squares of 8×8. Adds linear radiance to `picture` and, with the probes as spheres in it, to `probe_picture`;
- * sample_index 0 overwrites. Alpha counts samples; in views that show no light, those that hit something.
+ * Dispatch: one thread a pixel, one sample each; groups of 64: of the pixels in `chosen` (their numbers, row by row
+ * from the bottom), or where chosen_count is −1 of all, in squares of 8×8. Adds linear radiance to `picture` and, with
+ * the probes as spheres in it, to `probe_picture`; sample_index 0 overwrites. Alpha counts samples; in views that show
+ * no light, those that hit something.
  * view_info: as in viewport_surface_vert, of which the matrix is not used
  * spheres: as core/sphere_tiles.py lists them by tile: centre, node of the grid, −1 culled, −2 invalid
  */

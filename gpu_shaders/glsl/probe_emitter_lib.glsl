@@ -1,4 +1,6 @@
-/* Which places on sampled emitters a probe sees by its texels and which by points on the emitters: whichever are denser there. */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Which places on sampled emitters a probe sees by its texels and which by points on the emitters: whichever are denser
+ * there. */
 
 /* CANDIDATE_COUNT points on emitters, per steradian as a probe sees them. */
 float point_density(float density, float squared_distance, float cosine)

@@ -1,7 +1,8 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Where a misplaced probe could go: the nearest surface in each of the six faces.
  *
- * Dispatch: one group of 6 threads a probe of `slots`, one thread a face. Writes 6 elements a probe: offset to the surface, its distance
- * (NO_SURFACE where the face shows none).
+ * Dispatch: one group of 6 threads a probe of `slots`, one thread a face. Writes 6 elements a probe: offset to the
+ * surface, its distance (NO_SURFACE where the face shows none).
  */
 
 void main()

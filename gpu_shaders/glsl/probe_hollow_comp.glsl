@@ -1,6 +1,8 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Share of the texels of probes, of those that see patches, that lie on slow ones.
  *
- * Dispatch: one group of 64 threads a probe. probe_layers, 1 element a probe of the dispatch: its layer. shares: as many.
+ * Dispatch: one group of 64 threads a probe. probe_layers, 1 element a probe of the dispatch: its layer. shares: as
+ * many.
  */
 
 SHARED_ int partial_counts[128];

@@ -1,11 +1,14 @@
-/* Paths that leave probes in all directions and follow light to its end, whatever the bake made of it: an independent estimate of what the
- * probes should hold. No texel, patch or band is in it.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Paths that leave probes in all directions and follow light to its end, whatever the bake made of it: an independent
+ * estimate of what the probes should hold. No texel, patch or band is in it.
  *
- * Dispatch: one thread a path, paths_each for each series and probe, the probes of one series side by side; groups of 64. Each writes three
- * samples (direction, radiance over density) that together estimate the light from everywhere: the path (density 1/4π), one point on the sampled
- * emitters, one place on a sun of the world. Series are independent of each other (SETS in core/path_check.py). The path's first direction is stratified over a
- * probe's paths of a series; everything after it is independent (one shifted sequence for several
- * bounces would be correlated between them). Directions carry in w whether the first surface is seen from behind.
+ * Dispatch: one thread a path, paths_each for each series and probe, the probes of one series side by side; groups of
+ * 64. Each writes three samples (direction, radiance over density) that together estimate the light from everywhere:
+ * the path (density 1/4π), one point on the sampled
+ * emitters, one place on a sun of the world. Series are independent of each other (SETS in core/path_check.py). The
+ * path's first direction is stratified over a probe's paths of a series; everything after it is independent (one
+ * shifted sequence for several bounces would be correlated between them). Directions carry in w whether the first
+ * surface is seen from behind.
  */
 
 const float SPHERE = 12.566370614359172;
@@ -93,12 +96,14 @@ void main()
       vec3 across = cross(element(triangle_corners, 3 * hit.triangle + 1).xyz - a,
                           element(triangle_corners, 3 * hit.triangle + 2).xyz - a);
       float cosine = abs(dot(direction, normalize(across)));
-      radiance += throughput * surface.emission * (1.0 - share_of_points(surface.emitter_density, hit.distance, cosine));
+      radiance += throughput * surface.emission *
+                  (1.0 - share_of_points(surface.emitter_density, hit.distance, cosine));
     }
     behind = segment == 0 && surface.back ? 1.0 : behind;
 #ifdef HAS_GLOSS
     Way way = Way(direction, hit, surface, throughput, radiance);
-    follow_reflections(way, own_key, 0, MOST_REFLECTIONS * segment, MOST_REFLECTIONS, segment == 0 ? 0.03 : PATCH_BLUR, 0.1);
+    float blur = segment == 0 ? 0.03 : PATCH_BLUR;
+    follow_reflections(way, own_key, 0, MOST_REFLECTIONS * segment, MOST_REFLECTIONS, blur, 0.1);
     direction = way.direction;
     hit = way.hit;
     surface = way.surface;

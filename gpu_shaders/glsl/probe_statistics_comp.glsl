@@ -1,10 +1,12 @@
-/* What each probe sees as a whole: the depth statistics of its lookup and how much of it is back faces, background and lit.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What each probe sees as a whole: the depth statistics of its lookup and how much of it is back faces, background and
+ * lit.
  *
- * Dispatch: one group of 64 threads a probe; thread t makes texel t of the octahedral map from 16 directions spread over DEPTH_SPREAD
- * of it.
+ * Dispatch: one group of 64 threads a probe; thread t makes texel t of the octahedral map from 16 directions spread
+ * over DEPTH_SPREAD of it.
  * Back faces of `shells` do not count (core/orientation.py).
- * Writes depth_moments (mean, mean square of the clamped distance) and probe_shares, shares of the sphere: back faces of
- * solids, background, anything that sends light, all back faces.
+ * Writes depth_moments (mean, mean square of the clamped distance) and probe_shares, shares of the sphere: back faces
+ * of solids, background, anything that sends light, all back faces.
  */
 
 SHARED_ vec4 partial_shares[64];

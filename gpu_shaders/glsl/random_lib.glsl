@@ -1,6 +1,8 @@
-/* Seeded numbers that depend on what is sampled and on nothing else, so that any split of the work gives the same bytes.
- * Hash: Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 2020 (pcg3d). Sequence: Roberts' R2, two-dimensional
- * low discrepancy, rotated by the hash (Cranley and Patterson 1976). Reference: core/sampling.py.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Seeded numbers that depend on what is sampled and on nothing else, so that any split of the work gives the same
+ * bytes.
+ * Hash: Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 2020 (pcg3d). Sequence: Roberts' R2,
+ * two-dimensional low discrepancy, rotated by the hash (Cranley and Patterson 1976). Reference: core/sampling.py.
  */
 
 uvec3 pcg3d(uvec3 v)
@@ -16,8 +18,8 @@ uvec3 pcg3d(uvec3 v)
   return v;
 }
 
-/* Two numbers in [0, 1): sample `index` of the sequence that belongs to `key`. In integers, whose overflow is the sequence's
- * modulo 1: exact for any index, the same on every driver. */
+/* Two numbers in [0, 1): sample `index` of the sequence that belongs to `key`. In integers, whose overflow is the
+ * sequence's modulo 1: exact for any index, the same on every driver. */
 vec2 sample_r2(uvec3 key, int index)
 {
   uvec2 place = pcg3d(key).xy + uvec2(3242174889u, 2447445414u) * uint(index);
@@ -31,8 +33,8 @@ vec3 sample_r3(uvec3 key, int index)
   return vec3(place >> 8u) * (1.0 / 16777216.0);
 }
 
-/* One of several in proportion to weights that come one after the other: does the choice move on to this one? A single `number` chooses, what
- * is left of it is spread over 0..1 again; `total`: of the weights so far. */
+/* One of several in proportion to weights that come one after the other: does the choice move on to this one? A single
+ * `number` chooses, what is left of it is spread over 0..1 again; `total`: of the weights so far. */
 bool takes(float weight, inout float number, inout float total)
 {
   total += weight;

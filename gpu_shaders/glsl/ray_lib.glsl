@@ -1,12 +1,14 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Rays through the four-wide hierarchy of core/bvh.py.
  *
  * Nodes are entered in order of distance; the stack holds what is left, STACK_SIZE entries at most (known when the
- * hierarchy is built). A ray goes down until it reaches a leaf before any of its neighbours' leaves is tested (Aila and Laine,
- * "Understanding the Efficiency of Ray Traversal on GPUs", HPG 2009): drivers that run threads side by side pay for both kinds of step
- * otherwise. The triangle test is watertight: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection",
- * JCGT 2013. Both sides of a triangle are hit. With HAS_ALPHA, triangles of clipped materials ask surface_lib's
- * `is_hole` first; with HAS_UNSEEN, rays pass triangles that their kind does not see; with HAS_LINKS, shadow rays to an emitter those that
- * are none of its blockers. With HAS_TINT holes may be coloured: what hits or misses is the same, and what light has passed is asked afterwards.
+ * hierarchy is built). A ray goes down until it reaches a leaf before any of its neighbours' leaves is tested (Aila and
+ * Laine, "Understanding the Efficiency of Ray Traversal on GPUs", HPG 2009): drivers that run threads side by side pay
+ * for both kinds of step otherwise. The triangle test is watertight: Woop, Benthin and Wald, "Watertight Ray/Triangle
+ * Intersection", JCGT 2013. Both sides of a triangle are hit. With HAS_ALPHA, triangles of clipped materials ask
+ * surface_lib's `is_hole` first; with HAS_UNSEEN, rays pass triangles that their kind does not see; with HAS_LINKS,
+ * shadow rays to an emitter those that are none of its blockers. With HAS_TINT holes may be coloured: what hits or
+ * misses is the same, and what light has passed is asked afterwards.
  *
  * Samplers: bvh_nodes, triangle_corners.
  */
@@ -18,8 +20,8 @@ const int CLIPPED = 1, UNSEEN_BY_SHADOW_RAYS = 2, UNSEEN_BY_DIFFUSE_RAYS = 4,
 const int ROLE_SHIFT = 5; /* a triangle's role in light linking is what stands above its other bits */
 
 #ifdef HAS_LINKS
-/* Light linking, see core/light_links.py. links, LINK_GROUPS + 1 elements a role: group of its own emission; then for each group whether its light
- * falls on surfaces of this role, and whether they block it. Group 0 is not linked. */
+/* Light linking, see core/light_links.py. links, LINK_GROUPS + 1 elements a role: group of its own emission; then for
+ * each group whether its light falls on surfaces of this role, and whether they block it. Group 0 is not linked. */
 int lit_role = -1; /* of the surface that is being lit, said before light is asked for; −1: an eye, which sees all */
 
 int role_of_triangle(int triangle)
@@ -103,9 +105,10 @@ vec4 enter_boxes(Ray ray, int node, float limit)
   return mix(vec4(NO_HIT), entry, lessThanEqual(entry, leave));
 }
 
-/* Does the ray start on this triangle as far as float32 can tell? Corners far away are rounded so coarsely that a hit point on a ground
- * plane of a kilometre may lie beneath it, and a ray from there would find the plane again. a, b, c: corners from the ray's
- * origin. Where step_off already leaves the surface by more than that, nothing is ignored, so rays cannot slip out at edges of rooms. */
+/* Does the ray start on this triangle as far as float32 can tell? Corners far away are rounded so coarsely that a hit
+ * point on a ground plane of a kilometre may lie beneath it, and a ray from there would find the plane again. a, b, c:
+ * corners from the ray's origin. Where step_off already leaves the surface by more than that, nothing is ignored, so
+ * rays cannot slip out at edges of rooms. */
 bool starts_on(Ray ray, vec3 a, vec3 b, vec3 c)
 {
   vec3 most = max(abs(a), max(abs(b), abs(c)));
@@ -158,9 +161,8 @@ bool is_unseen(Ray ray, vec4 corner, vec4 corner1, vec4 corner2, int unseen)
   return false;
 }
 
-/* Tests triangle `index`; on a hit nearer than hit.distance replaces it. Returns true where its leaf ends. `unseen`: the bit of triangles
- * that the ray passes,
- * and above ROLE_SHIFT the group of emitters that it goes to. */
+/* Tests triangle `index`; on a hit nearer than hit.distance replaces it. Returns true where its leaf ends. `unseen`:
+ * the bit of triangles that the ray passes, and above ROLE_SHIFT the group of emitters that it goes to. */
 bool intersect_triangle(Ray ray, int index, int unseen, inout Hit hit)
 {
   vec4 corner = element(triangle_corners, 3 * index);
@@ -188,9 +190,9 @@ bool intersect_triangle(Ray ray, int index, int unseen, inout Hit hit)
     float swap_child = child[i]; child[i] = child[j]; child[j] = swap_child; \
   }
 
-/* The nearest of what is left becomes `item`; without any the ray ends. With LEAN_STACK the stack does not know how far away things are,
- * and what lies behind the hit is found out when it is looked at: GPUs have stacks in memory and gain by half the traffic, software drivers
- * lose half their speed. */
+/* The nearest of what is left becomes `item`; without any the ray ends. With LEAN_STACK the stack does not know how far
+ * away things are, and what lies behind the hit is found out when it is looked at: GPUs have stacks in memory and gain
+ * by half the traffic, software drivers lose half their speed. */
 #ifdef LEAN_STACK
 #  define TAKE_NEXT \
   if (top == 0) { \
@@ -264,6 +266,28 @@ Hit trace_view(vec3 origin, vec3 direction)
   return trace_nearest(origin, direction, NO_HIT, 0);
 }
 
+/* Down to a leaf, in any order; where nothing is left the function ends with `result`. */
+#define GO_DOWN(result) \
+  while (item >= 0) { \
+    vec4 entry = enter_boxes(ray, item, limit); \
+    vec4 child = element(bvh_nodes, item * 7 + 6); \
+    item = NO_NODE; \
+    for (int i = 0; i < 4; i++) { \
+      if (entry[i] < NO_HIT) { \
+        if (item != NO_NODE) { \
+          stack[top++] = item; \
+        } \
+        item = int(child[i]); \
+      } \
+    } \
+    if (item == NO_NODE) { \
+      if (top == 0) { \
+        return result; \
+      } \
+      item = stack[--top]; \
+    } \
+  }
+
 /* Is anything hit nearer than `limit` that does not have the bit `unseen`? */
 bool trace_any_seen(vec3 origin, vec3 direction, float limit, int unseen)
 {
@@ -273,25 +297,7 @@ bool trace_any_seen(vec3 origin, vec3 direction, float limit, int unseen)
   int top = 0;
   int item = 0;
   while (true) {
-    while (item >= 0) {
-      vec4 entry = enter_boxes(ray, item, limit);
-      vec4 child = element(bvh_nodes, item * 7 + 6);
-      item = NO_NODE;
-      for (int i = 0; i < 4; i++) {
-        if (entry[i] < NO_HIT) {
-          if (item != NO_NODE) {
-            stack[top++] = item;
-          }
-          item = int(child[i]);
-        }
-      }
-      if (item == NO_NODE) {
-        if (top == 0) {
-          return false;
-        }
-        item = stack[--top];
-      }
-    }
+    GO_DOWN(false)
     int index = -1 - item;
     while (!intersect_triangle(ray, index, unseen, hit)) {
       index++;
@@ -319,7 +325,8 @@ bool trace_any(vec3 origin, vec3 direction, float limit)
 }
 
 #ifdef HAS_TINT
-/* What coloured holes nearer than `limit` leave of light along a ray that is of the kind `unseen` and hits nothing else before. */
+/* What coloured holes nearer than `limit` leave of light along a ray that is of the kind `unseen` and hits nothing else
+ * before. */
 vec3 tint_along(vec3 origin, vec3 direction, float limit, int unseen)
 {
   Ray ray = make_ray(origin, direction);
@@ -328,25 +335,7 @@ vec3 tint_along(vec3 origin, vec3 direction, float limit, int unseen)
   int top = 0;
   int item = 0;
   while (true) {
-    while (item >= 0) {
-      vec4 entry = enter_boxes(ray, item, limit);
-      vec4 child = element(bvh_nodes, item * 7 + 6);
-      item = NO_NODE;
-      for (int i = 0; i < 4; i++) {
-        if (entry[i] < NO_HIT) {
-          if (item != NO_NODE) {
-            stack[top++] = item;
-          }
-          item = int(child[i]);
-        }
-      }
-      if (item == NO_NODE) {
-        if (top == 0) {
-          return tint;
-        }
-        item = stack[--top];
-      }
-    }
+    GO_DOWN(tint)
     int index = -1 - item;
     bool ends = false;
     while (!ends) {

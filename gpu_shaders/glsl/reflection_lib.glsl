@@ -1,4 +1,6 @@
-/* Rays that go on where they are mirrored, until they end on something that sends light in all directions, or in the world.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Rays that go on where they are mirrored, until they end on something that sends light in all directions, or in the
+ * world.
  *
  * Reference: core/reference_gloss.py. Samplers beside those of its libraries: world_texels.
  */
@@ -43,8 +45,8 @@ void go_on(inout Way way, Reflection reflection, float width, bool meets_lamps, 
 #endif
 }
 
-/* Follows the ray `number` of `key`, whose reflections count from `first` on, `most` of them; it sees lamps in lobes of at least `blur`.
- * Where it ends, `surface.albedo` is what it finds sent diffusely. */
+/* Follows the ray `number` of `key`, whose reflections count from `first` on, `most` of them; it sees lamps in lobes of
+ * at least `blur`. Where it ends, `surface.albedo` is what it finds sent diffusely. */
 void follow_reflections(inout Way way, uvec3 key, int number, int first, int most, float blur, float spread)
 {
   for (int depth = first; depth < first + most && way.throughput != vec3(0.0); depth++) {

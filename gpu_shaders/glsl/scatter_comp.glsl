@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Writes single elements of a linear array: the one at column and row places[i].xy of `target` becomes values[i].
  *
  * Dispatch: one thread a value; groups of 64.

@@ -1,7 +1,10 @@
-/* Sheets let light through diffusely; what a patch on one shows is the light of both of its sides. Reference and reasons: core/sheets.py.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Sheets let light through diffusely; what a patch on one shows is the light of both of its sides. Reference and
+ * reasons: core/sheets.py.
  *
- * sheets, 1 element a sheet: share of the light of the back, and with HAS_LINKS the role of its surface in light linking. Number 0 is no sheet and
- * lets nothing through; others may let nothing through as well, and are told apart by their role.
+ * sheets, 1 element a sheet: share of the light of the back, and with HAS_LINKS the role of its surface in light
+ * linking. Number 0 is no sheet and lets nothing through; others may let nothing through as well, and are told apart by
+ * their role.
  */
 
 const uint BACK_STREAM = 0x51ED2705u, SIDE_STREAM = 0x6C8E9CF5u;

@@ -1,5 +1,6 @@
-/* Gradients on the sphere of the basis functions that irradiance needs, GRADIENT_COEFFICIENTS of them, perpendicular to the
- * direction: those of the polynomials less their part along it. Reference: core/spherical_harmonics.py.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Gradients on the sphere of the basis functions that irradiance needs, GRADIENT_COEFFICIENTS of them, perpendicular to
+ * the direction: those of the polynomials less their part along it. Reference: core/spherical_harmonics.py.
  */
 
 void sh_basis_gradient(vec3 d, float y[COEFFICIENTS], out vec3 gradient[GRADIENT_COEFFICIENTS])

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Real orthonormal spherical harmonics without the Condon-Shortley phase, order l(l+1)+m.
  * Sloan, "Stupid Spherical Harmonics (SH) Tricks", 2008, A2. Reference: core/spherical_harmonics.py.
  * BANDS is 1 to 4, COEFFICIENTS = BANDS².

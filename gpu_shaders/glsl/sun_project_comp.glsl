@@ -1,5 +1,6 @@
-/* What probes see of the suns of the world, added to the field: rays to their discs, as texels are far larger than these and would see
- * a sun past a window's edge or not at all. Reference: core/reference_bake.py.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What probes see of the suns of the world, added to the field: rays to their discs, as texels are far larger than
+ * these and would see a sun past a window's edge or not at all. Reference: core/reference_bake.py.
  *
  * Dispatch: one group of GROUP threads a probe, each with one ray to each sun; fixed order of summation.
  * probe_layers, 1 element a probe of the dispatch: its layer; its slot is that much after first_slot

@@ -1,8 +1,10 @@
-/* Albedo and emission of texels anew, from the triangles that they hit before: for other materials, another world, or triangles
- * with other numbers. No ray is traced.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Albedo and emission of texels anew, from the triangles that they hit before: for other materials, another world, or
+ * triangles with other numbers. No ray is traced.
  *
- * Dispatch: x = columns, y = 6·FACE rows, z = probes; groups of 8×8×1; layer = probe. With RENUMBER, new_numbers holds the new number of each
- * old triangle, −1 where it is gone (its texels are to be captured again). Writes 1 to `rebind` if a texel that reflected nothing now
+ * Dispatch: x = columns, y = 6·FACE rows, z = probes; groups of 8×8×1; layer = probe. With RENUMBER, new_numbers holds
+ * the new number of each old triangle, −1 where it is gone (its texels are to be captured again). Writes 1 to `rebind`
+ * if a texel that reflected nothing now
  * does, or the other way round: then patches must be found anew.
  */
 

@@ -1,9 +1,11 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* What a hit surface is made of: attributes of a triangle, its material, its images.
  *
  * Layouts are written by scene_textures.py:
  *   triangle_attributes, 5 elements a triangle: normals and (material, object, texture scale) in w; uv0 uv1;
  *     uv2, the density with which the triangle is sampled as an emitter (core/emitters.py), its number in the snapshot
- *   materials, 3 elements: diffuse albedo, base image | emission, emission image | alpha, threshold, alpha image, alpha from colour
+ *   materials, 3 elements: diffuse albedo, base image | emission, emission image | alpha, threshold, alpha image, alpha
+ *     from colour
  *   tints, 1 element a material: what its holes leave of light, image
  *   faint_gloss, 2 elements a material: see core/faint_gloss.py
  *   image_table, 1 element: first row in image_texels, width, height, extension
@@ -71,7 +73,8 @@ vec2 triangle_uv(int triangle, vec2 barycentric)
 float dither_threshold(int triangle, vec2 barycentric)
 {
   uvec2 cell = uvec2(clamp(barycentric, 0.0, 1.0) * 256.0);
-  uint mixed = uint(element(triangle_attributes, 5 * triangle + 4).w) * 0x9E3779B1u ^ cell.x * 0x85EBCA6Bu ^ cell.y * 0xC2B2AE35u;
+  uint mixed = uint(element(triangle_attributes, 5 * triangle + 4).w) * 0x9E3779B1u ^ cell.x * 0x85EBCA6Bu ^
+               cell.y * 0xC2B2AE35u;
   mixed = (mixed ^ (mixed >> 16u)) * 0x7FEB352Du;
   mixed = (mixed ^ (mixed >> 15u)) * 0x846CA68Bu;
   mixed ^= mixed >> 16u;
@@ -139,8 +142,9 @@ void send_faint_gloss(inout Surface surface, int material, float cosine)
 }
 #endif
 
-/* Where a ray meets a triangle's plane, near the `interpolated` hit. Interpolation is off by the rounding of the corners, centimetres on a
- * ground plane of kilometres; the plane is as exact as its nearest corner, and exact where it is parallel to two axes. */
+/* Where a ray meets a triangle's plane, near the `interpolated` hit. Interpolation is off by the rounding of the
+ * corners, centimetres on a ground plane of kilometres; the plane is as exact as its nearest corner, and exact where it
+ * is parallel to two axes. */
 vec3 meet_plane(vec3 a, vec3 b, vec3 c, vec3 geometric, vec3 interpolated, vec3 origin, vec3 direction)
 {
   vec3 to_a = a - origin, to_b = b - origin, to_c = c - origin;

@@ -1,11 +1,12 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Texel surfaces from hits: everything about a texel that does not change when only lights change.
  *
- * Dispatch: x = columns, y = 6·FACE rows, z = probes; groups of 8×8×1. Reads layer probe·6 + face of `hits`, writes layer
- * first_layer + probe of:
+ * Dispatch: x = columns, y = 6·FACE rows, z = probes; groups of 8×8×1. Reads layer probe·6 + face of `hits`, writes
+ * layer first_layer + probe of:
  *   geometry  octahedral normal, signed distance (negative: back face; NO_SURFACE: background), triangle
  *   albedo    diffuse albedo; texel_patches_comp later adds the patch
- *   emission  emitted radiance, density where it is sampled as a light, 0 where it is not; the world's radiance where the texel sees
- *             background
+ *   emission  emitted radiance, density where it is sampled as a light, 0 where it is not; the world's radiance
+ *             where the texel sees background
  * Albedo and emission are what arrives of them at the probe, through coloured holes.
  */
 

@@ -1,12 +1,14 @@
-/* Where texels meet surfaces that reflect, as one linear array: position and packed normal, −1 where there is nothing to light. With
- * HAS_SHEETS also on which sheet each lies; hits on sheets stay on the surface, because rays leave it on both sides.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Where texels meet surfaces that reflect, as one linear array: position and packed normal, −1 where there is nothing
+ * to light. With HAS_SHEETS also on which sheet each lies; hits on sheets stay on the surface, because rays leave it on
+ * both sides.
  *
- * Dispatch: x = columns, y = 6·FACE rows, z = probes; groups of 8×8×1. Element of a texel: (probe · 6·FACE + row) · FACE + column, for
- * layer first_layer + probe.
+ * Dispatch: x = columns, y = 6·FACE rows, z = probes; groups of 8×8×1. Element of a texel: (probe · 6·FACE + row) ·
+ * FACE + column, for layer first_layer + probe.
  */
 
-/* The point of a triangle nearest to `point`, which lies on its plane. Rasterised triangles reach a 256th of a texel over their edges:
- * a point there may lie behind the next wall. */
+/* The point of a triangle nearest to `point`, which lies on its plane. Rasterised triangles reach a 256th of a texel
+ * over their edges: a point there may lie behind the next wall. */
 vec3 into_triangle(int triangle, vec3 point)
 {
   vec3 a = element(triangle_corners, 3 * triangle).xyz;

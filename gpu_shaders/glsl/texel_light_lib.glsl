@@ -1,5 +1,6 @@
-/* Light of texels by the patches that they lie on: albedo.w is the patch, −1 for none; with REFLECTIONS also what they mirror, see
- * texel_mirrored_comp. */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Light of texels by the patches that they lie on: albedo.w is the patch, −1 for none; with REFLECTIONS also what they
+ * mirror, see texel_mirrored_comp. */
 
 #ifdef REFLECTIONS
 /* Radiance times π that a texel mirrors, by the light of patches. */
@@ -15,8 +16,8 @@ vec3 texel_mirrored(ivec3 at)
 }
 #endif
 
-/* Reflected radiance times π of a texel whose irradiance is an element of `patch_irradiance`: that of its patch, or `own`
- * where that is not negative. */
+/* Reflected radiance times π of a texel whose irradiance is an element of `patch_irradiance`: that of its patch, or
+ * `own` where that is not negative. */
 vec3 texel_reflected(ivec3 at, int own)
 {
   vec4 reflects = texelFetch(albedo, at, 0);

@@ -1,8 +1,11 @@
-/* Puts together what texel_reflections_comp found with the patches `ends` on which its rays ended, and marks these as seen.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Puts together what texel_reflections_comp found with the patches `ends` on which its rays ended, and marks these as
+ * seen.
  *
  * Dispatch: one thread a texel of texel_count from first_texel on; groups of 64; inputs count from first_texel.
- * mirrored, REFLECTIONS + 1 elements a texel: radiance that rays brought along; then for each ray by what part of the irradiance
- * it counts, and the patch that it is of, negative for none. Rays that end on no patch are left out of the mean.
+ * mirrored, REFLECTIONS + 1 elements a texel: radiance that rays brought along; then for each ray by what part of the
+ * irradiance it counts, and the patch that it is of, negative for none. Rays that end on no patch are left out of the
+ * mean.
  */
 
 void main()

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Notes in albedo.w on which patch each texel lies, −1 for none.
  *
  * Dispatch: x = columns, y = 6·FACE rows, z = probes; groups of 8×8×1. `patches` counts texels as texel_hits_comp does.

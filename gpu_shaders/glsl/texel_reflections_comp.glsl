@@ -1,13 +1,19 @@
-/* What texels on glossy surfaces see mirrored: REFLECTIONS rays each, which go on until they end on something diffuse, and lamps.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What texels on glossy surfaces see mirrored: REFLECTIONS rays each, which go on until they end on something diffuse,
+ * and lamps.
  *
- * Rays leave, and lamps are looked at, from places spread over what the texel shows: mirrored things are smaller than a texel.
- * Dispatch: x = columns, y = 6·FACE rows, z = probes from first_probe on; groups of 8×8×1. Texel: (probe · 6·FACE + row) · FACE + column.
- * Writes for each ray `hits` (position, packed normal; −1 where nothing more comes), `hit_sheets` and `reflected`, by which the light there
- * counts; for each texel `carried`, what its rays brought along and lamps send; and into `albedo`, what glossy texels send back diffusely.
+ * Rays leave, and lamps are looked at, from places spread over what the texel shows: mirrored things are smaller than a
+ * texel.
+ * Dispatch: x = columns, y = 6·FACE rows, z = probes from first_probe on; groups of 8×8×1. Texel: (probe · 6·FACE +
+ * row) · FACE + column.
+ * Writes for each ray `hits` (position, packed normal; −1 where nothing more comes), `hit_sheets` and `reflected`, by
+ * which the light there counts; for each texel `carried`, what its rays brought along and lamps send; and into
+ * `albedo`, what glossy texels send back diffusely.
  * Reference: core/reference_gloss.py.
  */
 
-/* The ray through `place` (0..1) of a texel to the plane of what its `middle` has met; the middle itself where that slants too much. */
+/* The ray through `place` (0..1) of a texel to the plane of what its `middle` has met; the middle itself where that
+ * slants too much. */
 Way way_through(vec2 place, Way middle, vec3 origin, ivec2 texel)
 {
   Way way = middle;
@@ -22,7 +28,8 @@ Way way_through(vec2 place, Way middle, vec3 origin, ivec2 texel)
   way.surface.position = origin + distance * direction;
   vec2 barycentric = barycentric_of(middle.hit.triangle, way.surface.position);
   int first = 5 * middle.hit.triangle;
-  vec3 normal = normalize(interpolate(element(triangle_attributes, first).xyz, element(triangle_attributes, first + 1).xyz,
+  vec3 normal = normalize(interpolate(element(triangle_attributes, first).xyz,
+                                      element(triangle_attributes, first + 1).xyz,
                                       element(triangle_attributes, first + 2).xyz, barycentric));
   way.surface.normal = middle.surface.back ? -normal : normal;
   return way;
@@ -63,7 +70,8 @@ Way met_in_middle(int triangle, float distance, vec3 origin, vec3 direction)
   inside /= max(inside.x + inside.y, 1.0);
   if (inside != barycentric) {
     barycentric = inside;
-    surface.position = interpolate(element(triangle_corners, 3 * triangle).xyz, element(triangle_corners, 3 * triangle + 1).xyz,
+    surface.position = interpolate(element(triangle_corners, 3 * triangle).xyz,
+                                   element(triangle_corners, 3 * triangle + 1).xyz,
                                    element(triangle_corners, 3 * triangle + 2).xyz, inside);
   }
   surface.albedo *= passed_to(origin, direction, distance * 0.9999);
@@ -80,7 +88,8 @@ vec3 lamps_looked_at(Gloss gloss, Way middle, vec3 origin, ivec2 texel, float wi
     Way way = way_through(sample_r3(place_key, look).xy, middle, origin, texel);
     vec3 light = lamps_in_gloss(gloss, way.surface, beginning(way), -way.direction, width, light_key, look);
     uvec3 event = reflection_event(light_key, look, 0);
-    Reflection reflection = reflect_at(gloss, way.surface, middle.hit.triangle, -way.direction, event, sample_r2(light_key, look));
+    Reflection reflection = reflect_at(
+        gloss, way.surface, middle.hit.triangle, -way.direction, event, sample_r2(light_key, look));
     light += reflection.mirrored * lamps_mirrored(way, reflection.direction, width);
     if (light != vec3(0.0) && !is_hidden(way, origin)) {
       sum += light / float(looks);
@@ -140,7 +149,8 @@ void main()
       diffuse += reflection.diffuse;
 #ifdef HAS_EMITTERS
       uvec3 emitter_key = light_key + uvec3(0u, 0u, 0x2545F491u);
-      way.brought = emitters_in_gloss(gloss, way.surface, beginning(way), -way.direction, width, emitter_key, ray_number);
+      way.brought = emitters_in_gloss(
+          gloss, way.surface, beginning(way), -way.direction, width, emitter_key, ray_number);
 #endif
       go_on(way, reflection, width, false, 2.0 / float(FACE));
       follow_reflections(way, key, ray_number, 1, MOST_REFLECTIONS - 1, PATCH_BLUR, 2.0 / float(FACE));

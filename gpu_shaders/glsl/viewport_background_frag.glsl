@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The world behind the scene, fragment stage. view_info as in viewport_surface_vert. */
 
 void main()

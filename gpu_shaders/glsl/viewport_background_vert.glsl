@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The world behind the scene, vertex stage: one triangle over the whole view, at its far end.
  *
  * Draw: 3 vertices.

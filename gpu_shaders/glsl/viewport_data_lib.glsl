@@ -1,7 +1,9 @@
-/* What the preview shows of a field: probes, and data as colours. The same for the viewport, the render engine and preview.png.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What the preview shows of a field: probes, and data as colours. The same for the viewport, the render engine and
+ * preview.png.
  *
- * shade_info: field's centre in the scene's frame, mode | factor of indirect light, specular reflectance, Phong exponent, 1 if
- *             probes show radiance instead of irradiance
+ * shade_info: field's centre in the scene's frame, mode | factor of indirect light, specular reflectance, Phong
+ *             exponent, 1 if probes show radiance instead of irradiance
  * node_marks, 1 element a node: validity, state, relative error of the cell that the node is the first corner of
  * Data modes return values that Standard display shows as meant: numbers of a display, linearised.
  */
@@ -26,8 +28,8 @@ vec3 display_to_linear(vec3 display)
 }
 
 #ifdef HAS_FIELD
-/* Colour of a probe's state: green where it sees free space, towards orange the more back faces it sees, red where it is invalid, blue
- * where it is culled. */
+/* Colour of a probe's state: green where it sees free space, towards orange the more back faces it sees, red where it
+ * is invalid, blue where it is culled. */
 vec3 state_color(int node)
 {
   vec4 marks = element(node_marks, node);
@@ -57,7 +59,8 @@ vec3 shade_probe(int mark, vec3 normal)
     return display_to_linear(state_color(mark));
   }
   if (shade_info[1].w == 0.0) {
-    return max(field_irradiance(mark, vec4(1.0, 0.0, 0.0, 0.0), vec4(0.0), vec4(0.0), normal), vec3(0.0)) * 0.3183098861837907;
+    vec3 irradiance = field_irradiance(mark, vec4(1.0, 0.0, 0.0, 0.0), vec4(0.0), vec4(0.0), normal);
+    return max(irradiance, vec3(0.0)) * 0.3183098861837907;
   }
   float basis[COEFFICIENTS];
   sh_basis(normal, basis);

@@ -1,12 +1,15 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The finished view, fragment stage: mean of the samples, exposure, tone curve, and the depth of the first sample.
  *
- * Pictures may be coarser than the screen. Their pixels then lie nearer or farther than the middle of their texel, and what Blender drew of
- * the same surface must not win over half of them: the nearest depth around counts.
+ * Pictures may be coarser than the screen. Their pixels then lie nearer or farther than the middle of their texel, and
+ * what Blender drew of the same surface must not win over half of them: the nearest depth around counts.
  *
- * Encodings: SCENE_LINEAR for render engines, whose view transform Blender applies; OVERLAY for draw handlers, whose picture Blender merges
- * with the scene's in a space where a display is a power of 2.2, whatever its view transform; DISPLAY for plain 8-bit images.
- * Tone curves: STANDARD is Blender's view of that name: exposure, clip, sRGB curve (IEC 61966-2-1), gamma. FILMIC rolls highlights off:
- * Hable, "Filmic Tonemapping Operators", 2010, white at 11.2. LINEAR shows the numbers themselves, without the sRGB curve.
+ * Encodings: SCENE_LINEAR for render engines, whose view transform Blender applies; OVERLAY for draw handlers, whose
+ * picture Blender merges with the scene's in a space where a display is a power of 2.2, whatever its view transform;
+ * DISPLAY for plain 8-bit images.
+ * Tone curves: STANDARD is Blender's view of that name: exposure, clip, sRGB curve (IEC 61966-2-1), gamma. FILMIC rolls
+ * highlights off: Hable, "Filmic Tonemapping Operators", 2010, white at 11.2. LINEAR shows the numbers themselves,
+ * without the sRGB curve.
  */
 
 const int SCENE_LINEAR = 0, OVERLAY = 1, DISPLAY = 2;
@@ -59,6 +62,7 @@ void main()
   }
   frag_color = vec4(color * coverage, coverage);
   float depth = depth_around(texel);
-  /* Toward the eye by a share of the distance, so that a surface that Blender drew at the same place does not win by rounding. */
+  /* Toward the eye by a share of the distance, so that a surface that Blender drew at the same place does not win by
+   * rounding. */
   gl_FragDepth = depth < 1.0 ? clamp(depth_scale_offset.x * depth + depth_scale_offset.y, 0.0, 1.0) : 1.0;
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The finished view, vertex stage: one triangle over the whole region.
  *
  * Draw: 3 vertices.

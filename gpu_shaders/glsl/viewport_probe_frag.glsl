@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Probes as spheres, fragment stage: meets the ray with the sphere, so the outline and the depth are exact. */
 
 void main()

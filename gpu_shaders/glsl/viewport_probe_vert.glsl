@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Probes as spheres, vertex stage: a square in front of each sphere, just large enough to hold its outline.
  *
  * Draw: 6 vertices, one instance per element of `spheres`: centre in the scene's frame, node or mark. Uses view_info as
@@ -25,6 +26,7 @@ void main()
   vec3 b = cross(t, axis);
   sphere_point = sphere.xyz + half_size * (corner.x * t + corner.y * b);
   vec4 point = vec4(sphere_point, 1.0);
-  vec4 clip = vec4(dot(view_info[4], point), dot(view_info[5], point), dot(view_info[6], point), dot(view_info[7], point));
+  vec4 clip = vec4(
+      dot(view_info[4], point), dot(view_info[5], point), dot(view_info[6], point), dot(view_info[7], point));
   gl_Position = outside ? clip : vec4(2.0, 2.0, 2.0, 1.0);
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* What the preview shows of surfaces; needs viewport_data_lib. */
 
 /* Reflected light of all lamps: diffuse, and a Phong lobe scaled to keep its energy (Lafortune and Willems, 1994). */
@@ -63,7 +64,8 @@ vec3 side_radiance(Surface surface, vec3 direction, vec3 towards, float distance
   vec3 radiance = vec3(0.0);
 #ifdef HAS_FIELD
   if (mode != DIRECT) {
-    radiance = surface.albedo * 0.3183098861837907 * shade_info[1].x * field_irradiance_at(surface.position, surface.normal);
+    radiance = surface.albedo * 0.3183098861837907 * shade_info[1].x *
+               field_irradiance_at(surface.position, surface.normal);
   }
 #endif
   if (mode != INDIRECT) {

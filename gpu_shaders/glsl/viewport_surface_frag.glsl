@@ -1,4 +1,6 @@
-/* The scene's triangles in a view, fragment stage: once for depth alone, then the nearest surface is shaded and added to the sum.
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The scene's triangles in a view, fragment stage: once for depth alone, then the nearest surface is shaded and added
+ * to the sum.
  *
  * With several volumes the second pass runs once for each and shades what belongs to that one.
  * volume_boxes, 4 elements a volume: rows from the scene's frame to the box −1..1; half sizes, metres

@@ -15,6 +15,7 @@ PURE_ROOMS = {"core", "formats"}
 BLENDER_MODULES = {"bpy", "gpu", "gpu_extras", "mathutils", "bmesh", "blf", "bpy_extras"}
 FILES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
 SOURCES = sorted([*FILES, ROOT / "__init__.py", *(ROOT / "tests").rglob("*.py"), *(ROOT / "scripts").rglob("*.py")])
+SHADERS = sorted([*(ROOT / "gpu_shaders" / "glsl").glob("*.glsl"), *(ROOT / "tests" / "gpu" / "glsl").glob("*.glsl")])
 NAMES = [str(path.relative_to(ROOT)) for path in FILES]
 
 
@@ -91,6 +92,18 @@ def test_files_stay_readable(path):
     assert len(lines) < 400, f"{len(lines)} lines: split it by responsibility"
     long = [number for number, line in enumerate(lines, 1) if len(line) > 120]
     assert not long, f"lines longer than 120: {long}"
+
+
+@pytest.mark.parametrize("path", SHADERS, ids=[path.name for path in SHADERS])
+def test_shaders_are_like_other_files(path):
+    """Licence, then what it is for; as long and as wide as others."""
+    licence, purpose, *rest = lines = path.read_text(encoding="utf-8").splitlines()
+    assert licence == "/* SPDX-License-Identifier: GPL-3.0-or-later */" and purpose.startswith("/* ")
+    assert len(lines) < 400, f"{len(lines)} lines: split it by responsibility"
+    long = [number for number, line in enumerate(lines, 1) if len(line) > 120]
+    assert not long, f"lines longer than 120: {long}"
+    if path.stem.endswith("_comp"):
+        assert any("Dispatch:" in line for line in rest), "no dispatch shape in the header"
 
 
 def test_importing_the_package_needs_no_blender():

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Copies a layered image into a linear array, layer by layer, row by row. */
 
 void main()

@@ -1,4 +1,6 @@
-/* Six elements a direction: octahedral coordinates and their inverse; its texel and that texel's direction; 16 SH functions. */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Six elements a direction: octahedral coordinates and their inverse; its texel and that texel's direction; 16 SH
+ * functions. */
 
 void main()
 {

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Image lookups: uv and footprint in places. */
 
 void main()

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Irradiance of light 0 at points by the place on it in `places`: shadow rays start at the points themselves. */
 
 void main()
@@ -6,7 +7,8 @@ void main()
   if (i < count) {
     vec3 point = element(points, i).xyz;
     LightSample light_sample = sample_light(0, point, element(places, i).xy);
-    vec3 irradiance = unshadowed_irradiance(0, light_sample, element(normals, i).xyz) * light_arriving(0, light_sample, point);
+    vec3 irradiance = unshadowed_irradiance(0, light_sample, element(normals, i).xyz) *
+                      light_arriving(0, light_sample, point);
     imageStore(result, element_position(i), vec4(irradiance, 0.0));
   }
 }

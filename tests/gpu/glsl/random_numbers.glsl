@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Two elements a key: the hash's first two numbers in halves of 16 bits; the R2 sample and the hash's third number.
  * keys: high and low 16 bits of x and y; low_key: those of z, sample index. */
 

@@ -1,4 +1,6 @@
-/* Two elements a ray: nearest hit (distance, triangle, barycentric); is anything nearer than the limit in directions.w? */
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Two elements a ray: nearest hit (distance, triangle, barycentric); is anything nearer than the limit in
+ * directions.w? */
 
 void main()
 {

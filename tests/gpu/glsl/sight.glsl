@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Does each of `hits` see the leader beside it? */
 
 void main()
