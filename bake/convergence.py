@@ -26,6 +26,7 @@ MANY_MODES = math.inf  # in place of a factor: the last states tell the limit, s
 _PARALLEL = 0.5  # most sine of the angle between two changes for the tail to be added, per (1 − ratio)
 _SINE_ROUNDING = 1e-6  # squared sine below what float32 sums can tell from zero
 _LEAST = 3  # changes of a series that tell of its limit
+_MOST_AHEAD = 3  # iterations that go on unwatched: each that was not needed costs about what looking costs a GPU
 _MOST_RATIO = 0.9985  # above it the tail is too uncertain to add
 _MINOR, _LITTLE = 0.25, 0.25  # share of the patches and of |light| that hollows may have where nobody waits for them
 _ANY = 1e-3  # share of the patches: less is no hollow
@@ -40,6 +41,7 @@ class Convergence:
         self._tolerance = tolerance
         self._lengths: list[float] = []  # |change| of the iterations since the last extrapolation
         self._slowest = 0.0  # ratio of the slowest mode that was extrapolated: changes may still hold some of it
+        self._last_ratio = math.inf
         self.iterations = 0
         self.changes: list[float] = []  # relative change of the field per iteration
         self.missing = math.inf  # estimated share of the light still to come
@@ -51,13 +53,22 @@ class Convergence:
     @property
     def until_decision(self) -> int:
         """How many more iterations it takes at least until something follows from them: nobody has to wait for the sums
-        of the ones before. From fewer than _LEAST changes of one series nothing does."""
-        ahead = max(_LEAST - len(self._lengths), 1)
+        of the ones before. From fewer than _LEAST changes of one series nothing does, and where light is likely to need
+        more anyway the next of them can tell."""
+        ahead = max(_LEAST - len(self._lengths), self._likely_ahead())
         return ahead if self._bounces is None else min(ahead, self._bounces + 1 - self.iterations)
 
-    def add(self, sums: Sums) -> float:
-        """Takes the sums of one iteration. Returns the factor to extrapolate by, 0 for none, MANY_MODES where the last
-        STATES states are to tell.
+    def _likely_ahead(self) -> int:
+        """Iterations until light has settled, at most _MOST_AHEAD, if changes go on as they did; at least one."""
+        if not 0.0 < self._last_ratio < 1.0 or not self._tolerance < self.missing < math.inf:
+            return 1
+        steps = math.log(self._tolerance / self.missing) / math.log(self._last_ratio)
+        return min(math.ceil(steps) + 1, _MOST_AHEAD)  # two estimates in a row have to be small
+
+    def add(self, sums: Sums, is_newest: bool = True) -> float:
+        """Takes the sums of one iteration, the ``is_newest`` or one that others have followed already. Returns the
+        factor to extrapolate by, 0 for none, MANY_MODES where the last STATES states are to tell; where others have
+        followed always 0, as only the newest state can be extrapolated.
 
         The first iteration is direct light and may be dark: what glows and the world arrive with the first bounce.
         Each further one is a bounce.
@@ -76,11 +87,12 @@ class Convergence:
         self.changes.append(relative)
         ratio = max(_ratio(self._lengths), self._slowest)
         last_missing, self.missing = self.missing, _still_missing(relative, ratio)
+        self._last_ratio = ratio
         if self._bounces is not None:
             self._count(self._bounces)
             return 0.0
         self._judge(sums, relative, ratio, last_missing)
-        return 0.0 if self.done else self._leap(sums, overlap)
+        return self._leap(sums, overlap) if is_newest and not self.done else 0.0
 
     def _count(self, bounces: int) -> None:
         """Ends after ``bounces``, settled or not."""

@@ -266,11 +266,11 @@ class VolumeBake:
     def _judge(self, convergence: Convergence, differences: list[tuple[Sums, float]]) -> None:
         """Tells ``convergence`` of the last iterations, and does what it says."""
         factor = 0.0
-        for sums, luminance in differences:
+        for number, (sums, luminance) in enumerate(differences, start=1):
             if convergence.done:
                 return
             self.result.energy.append(luminance)
-            factor = convergence.add(sums)
+            factor = convergence.add(sums, is_newest=number == len(differences))
             self._reporter.advance(1)
         if factor == MANY_MODES:
             self.backend.light.extrapolate_modes()

@@ -13,6 +13,7 @@ import numpy as np
 
 from .conventions import LUMINANCE
 from .grid import Grid
+from .kept import Kept
 from .light_links import link_roles
 from .snapshot import SceneSnapshot
 from .triangles import areas
@@ -37,8 +38,7 @@ def sampling_density(snapshot: SceneSnapshot, grid: Grid) -> np.ndarray:
     glowing = np.flatnonzero(luminance > 0)
     if not len(glowing):
         return density
-    corners = snapshot.triangle_positions
-    area = areas(corners)
+    area = _areas(snapshot.vertices, snapshot.triangles)
     per_object = np.bincount(snapshot.object_index[glowing], area[glowing], len(snapshot.object_names))
     most = max(float((grid.cell_size() ** 2).sum()), _SELDOM_SHARE * float(area.sum()))
     passing = _passing(snapshot)[snapshot.material_index[glowing]]
@@ -50,6 +50,9 @@ def sampling_density(snapshot: SceneSnapshot, grid: Grid) -> np.ndarray:
     if power.sum() > 0:
         density[sampled] = luminance[sampled] / power.sum()
     return density
+
+
+_areas = Kept(lambda vertices, triangles: areas(vertices[triangles]))
 
 
 def reach(density: np.ndarray) -> float:

@@ -39,6 +39,8 @@ def resolve(socket: bpy.types.NodeSocket, scope: Scope | None):
     counts.
     """
     for _ in range(10_000):  # a tree cannot be deeper; a broken file could hold a loop
+        if not socket.is_linked:  # asking for its links looks at all of the tree's
+            return socket, scope
         link = next((link for link in socket.links if not link.is_muted and link.is_valid), None)
         if link is None:
             return socket, scope

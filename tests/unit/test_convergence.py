@@ -17,8 +17,8 @@ def run(operator, source, tolerance=2e-3, bounces=None):
         ahead = ahead or watch.until_decision
         new = source + operator @ old if watch.iterations else source.copy()
         change = new - old
-        factor = watch.add(Sums(float(new @ new), float(change @ change), float(change @ (old - older))))
         ahead -= 1
+        factor = watch.add(Sums(float(new @ new), float(change @ change), float(change @ (old - older))), not ahead)
         assert not (ahead and factor) and watch.iterations < 2 * AUTO_LIMIT
         states.insert(0, new)
         if factor == MANY_MODES:
