@@ -45,7 +45,15 @@ def relative_rms(found, expected):
 
 @pytest.mark.parametrize("capture", ["raster", "trace"])
 @pytest.mark.parametrize("inward", [False, True], ids=["normals outward", "normals inward"])
-@pytest.mark.parametrize("albedo,tolerance", [(0.0, 5e-3), (0.5, 5e-3), (0.9, 5e-3), (0.99, 2e-2)])
+@pytest.mark.parametrize(
+    "albedo,tolerance",
+    [
+        (0.0, 5e-3),
+        pytest.param(0.5, 5e-3, marks=pytest.mark.any_version),
+        (0.9, 5e-3),
+        pytest.param(0.99, 2e-2, marks=pytest.mark.any_version),
+    ],
+)
 def test_furnace(albedo, tolerance, inward, capture):
     """Radiance 1 / (1 − a) everywhere, at every node for every normal, with the number of bounces chosen by the
     program."""
