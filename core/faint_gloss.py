@@ -33,9 +33,9 @@ _POWER = np.array([4.82, 4.64, 3.94, 3.32, 2.94, 2.76, 2.66, 2.68, 2.78])
 
 
 def faint_rows(glosses: Sequence[Gloss | None]) -> np.ndarray:
-    """(M, 2, 4) float32 elements of surface_lib's ``faint_gloss``: share of what is sent back, p | k, whether the
-    share is one of the light instead."""
-    rows = np.zeros((max(len(glosses), 1), 2, 4), np.float32)
+    """(M, 3, 4) float32 elements of surface_lib's ``faint_gloss``: share of what is sent back, p | k, whether the
+    share is one of the light instead | what facets mirror that are seen face on, their width α."""
+    rows = np.zeros((max(len(glosses), 1), 3, 4), np.float32)
     for row, gloss in zip(rows, glosses):
         gloss = gloss or NO_GLOSS
         power = np.interp(gloss.roughness, _ROUGHNESS, _POWER)
@@ -44,18 +44,26 @@ def faint_rows(glosses: Sequence[Gloss | None]) -> np.ndarray:
         row[0] = (*gloss.share, power)
         row[1, :3] = (1 - facing) * grazing / (facing + (1 - facing) * grazing * _mean(power))
         row[1, 3] = gloss.fixed
+        row[2] = (*gloss.facing, gloss.roughness**2)
     return rows
 
 
 def albedo_towards(rows: np.ndarray, albedo: np.ndarray, cosine: np.ndarray) -> np.ndarray:
-    """(N, 3) A(θ) of places of ``albedo`` (N, 3) and ``rows`` (N, 2, 4), seen at ``cosine`` (N,)."""
-    whole = _whole(rows, albedo)
-    mirrored = np.minimum(whole * (1 + rows[:, 1, :3] * _grazing(cosine, rows[:, 0, 3])), 1.0)
+    """(N, 3) A(θ) of places of ``albedo`` (N, 3) and ``rows`` (N, 3, 4), seen at ``cosine`` (N,)."""
+    whole, mirrored = mirrored_at(rows, albedo), mirrored_at(rows, albedo, cosine)
     return mirrored + (albedo - whole) * (1 - mirrored) / np.maximum(1 - whole, 1e-3)
 
 
+def mirrored_at(rows: np.ndarray, albedo: np.ndarray, cosine: np.ndarray | None = None) -> np.ndarray:
+    """(N, 3) F of places of ``albedo`` (N, 3) and ``rows`` (N, 3, 4) at ``cosine`` (N,); S without one."""
+    whole = _whole(rows, albedo)
+    if cosine is None:
+        return whole
+    return np.minimum(whole * (1 + rows[:, 1, :3] * _grazing(cosine, rows[:, 0, 3])), 1.0)
+
+
 def couplings(rows: np.ndarray, albedo: np.ndarray) -> np.ndarray:
-    """(N, 4) couplings of places of ``albedo`` (N, 3) and ``rows`` (N, 2, 4)."""
+    """(N, 4) couplings of places of ``albedo`` (N, 3) and ``rows`` (N, 3, 4)."""
     strength = rows[:, 1, :3] * _whole(rows, albedo) / np.maximum(albedo, 1e-9)
     return np.concatenate([strength, rows[:, 0, 3:]], axis=1)
 

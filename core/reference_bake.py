@@ -194,6 +194,13 @@ class ReferenceBake:
         radiance = reflected + np.where(sampled[..., None], 0.0, surfaces.emission)
         return sh.project(radiance, self.directions, self.solid_angles, self.settings.bands)
 
+    def highlights(self, surfaces: Surfaces, patch: np.ndarray) -> np.ndarray:
+        """(P, X, 3) radiance that texels send in highlights by the direct light of their ``patch`` (P, X)."""
+        if not self.light.highlights.is_there:
+            return np.zeros(surfaces.albedo.shape)
+        where = self.positions, self.nodes, patch, self.light.direct_by_part
+        return self.light.highlights.of_texels(surfaces, *where, self.settings.face, self.settings.seed)
+
     def project_emitters(self, surfaces: Surfaces) -> np.ndarray:
         """(P, K, 3) coefficients of what probes see of sampled emitters."""
         by_texels = sh.project(
@@ -261,6 +268,7 @@ def bake(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, offset: np
     field = job.field_statistics(surfaces, job.reflected(surfaces, patch, job.light.direct) + mirrored)
     job.light.connect()
     irradiance = job.light.iterate(settings.bounces)
+    highlighted = job.highlights(surfaces, patch)
     mirrored = job.mirrored(reflections, ends, irradiance)
     if settings.gather:
         hits = job.texel_hits(surfaces).reshape(-1, 4)
@@ -268,7 +276,7 @@ def bake(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, offset: np
         irradiance = job.light.gather(hits, gather_rays(settings.samples), irradiance, 0, sheets)
         patch = np.where(patch >= 0, np.arange(patch.size).reshape(patch.shape), patch)
     reflected = job.reflected(surfaces, patch, irradiance) + mirrored
-    coefficients = job.project(surfaces, reflected) + job.project_emitters(surfaces) + job.project_suns()
+    coefficients = job.project(surfaces, reflected + highlighted) + job.project_emitters(surfaces) + job.project_suns()
     field.coefficients = np.zeros((grid.count, settings.bands**2, 3))
     field.coefficients[job.nodes] = coefficients
     field.coefficients = dilation.fill(grid, field.coefficients, field.holds_light)

@@ -18,6 +18,7 @@ from .emitters import CANDIDATES
 from .gloss import (
     MOST_REFLECTIONS,
     PATCH_BLUR,
+    TEXEL_BLUR,
     TEXEL_RAYS,
     GlossyPlaces,
     Reflections,
@@ -258,7 +259,7 @@ class ReferenceGloss:
         origin = positions[glossy // texels]
         seen = Ways(directions, flat, origin + directions * flat.distance[:, None], zero + 1, zero.copy())
         middle = Middle(seen, self.places(seen), origin, glossy % texels, face, self.scene)
-        width = np.maximum(middle.places.alpha, middle.blur())
+        width = np.maximum(middle.places.alpha, TEXEL_BLUR * middle.turn())
         keys = keys_of(nodes[glossy // texels], _TEXEL_STREAM, seed)
         looks, looked = looks_at(len(self._lamps())), np.zeros((len(glossy), 3))
         for look in range(looks):

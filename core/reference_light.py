@@ -37,6 +37,7 @@ from .patches import (
 from .rays import leave_surface, step_off
 from .reference_emitters import ReferenceEmitters
 from .reference_gloss import ReferenceGloss, TexelReflections
+from .reference_highlights import EndedRays, Lit, ReferenceHighlights
 from .reference_lamps import ReferenceLamps
 from .reference_places import pack, split
 from .reference_scene import ReferenceScene
@@ -62,11 +63,12 @@ class ReferenceLight:
         self.scene, self.settings = scene, settings
         self.patches = Patches(grid)
         self.emitters = ReferenceEmitters(scene, sampling_density(scene.snapshot, grid))
-        self.direct = np.zeros((0, 3))
+        self.direct_by_part: dict[Part, np.ndarray] = {}  # (N, 3) each
         rest, suns = extract_suns(scene.snapshot.world)
         self._lamps = ReferenceLamps(scene, suns)
         self._world = world_texels(rest, settings.face).reshape(-1, 3)
-        self._effort = 1
+        self._effort, self._lit = 1, 0  # patches
+        self.highlights = ReferenceHighlights(scene, self.emitters, self._lamps)
         self.gloss = ReferenceGloss(scene, self.emitters, self._lamps.all, self.background)
 
     def background(self, directions: np.ndarray) -> np.ndarray:
@@ -104,12 +106,21 @@ class ReferenceLight:
         result[far] = self.scene.visible(ends[0][far], direction[far], range_[far])
         return result
 
+    @property
+    def direct(self) -> np.ndarray:
+        """(N, 3) irradiance of patches by lamps and sampled emitters."""
+        return sum(self.direct_by_part.values(), np.zeros((self._lit, 3)))
+
     # Direct light
     # ------------------------------------------------------------------------------------------------------------------
 
+    def forget_direct(self) -> None:
+        """No patch is lit."""
+        self.direct_by_part, self._lit = {}, 0
+
     def light_new_patches(self) -> None:
         """Direct light of the patches that were bound since the last call."""
-        lit = len(self.direct)
+        lit = self._lit
         if lit == self.patches.count:
             return
         if lit == 0:
@@ -119,15 +130,17 @@ class ReferenceLight:
         sheets = self.patch_sheets
         spread = {part: self.spread(self.patches.points, numbers, part, sheets) for part in parts}
         light = sum((mean for mean, _deviation in spread.values()), np.zeros(len(numbers)))
-        direct = np.zeros((len(numbers), 3))
+        self._lit = self.patches.count
         for part, (mean, deviation) in spread.items():
+            direct = np.zeros((len(numbers), 3))
             sample_class = direct_samples(mean, deviation, light, float(light.mean()))
             for index, samples in enumerate(SAMPLES):
                 chosen = np.flatnonzero(sample_class == index)
                 direct[chosen] += self.direct_light(
                     self.patches.points, numbers[chosen], samples * self._effort, part=part, sheets=sheets
                 )
-        self.direct = np.concatenate([self.direct, direct])
+            before = self.direct_by_part.get(part, np.zeros((lit, 3)))
+            self.direct_by_part[part] = np.concatenate([before, direct])
 
     def spread(
         self, points: np.ndarray, numbers: np.ndarray, part: Part, sheets: np.ndarray | None = None
@@ -312,8 +325,16 @@ class ReferenceLight:
             ends.append(self._bind_ends(rays, round_).reshape(-1, rays_each))
         self.light_new_patches()
         self._ends = without_caught(np.concatenate(ends))
-        self._brought = np.concatenate([rays.brought for rays in parts])
         self._reflected = np.concatenate([rays.reflected for rays in parts])
+        self._brought = np.concatenate([rays.brought for rays in parts])
+        if self.highlights.is_there:
+            self._brought += self.highlights_of(EndedRays(self._ends, self._reflected))
+
+    def highlights_of(self, rays: EndedRays, texels: Lit | None = None) -> np.ndarray:
+        """(C, 3) irradiance that patches, or ``texels`` (C), get of highlights where their ``rays`` end."""
+        points, sheets = self.patches.points, self.patch_sheets
+        patches = points, np.zeros(len(points), int) if sheets is None else sheets
+        return self.highlights.of_rays(texels or patches, patches, rays, self.direct_by_part, self.settings.seed)
 
     def bind_reflections(self, reflections: TexelReflections) -> np.ndarray:
         """(P·X·K,) patches on which rays of glossy texels end, founded where there are none."""
@@ -350,7 +371,11 @@ class ReferenceLight:
         direct[lit] = self.direct_light(points, lit, self.settings.samples, first_key, sheets=sheets)
         rays = self.trace(points, numbers, rays_each, self.settings.gather, first_key, sheets)
         ends = self._bind_ends(rays, MOST_ROUNDS - 1).reshape(len(hits), -1)
-        return bounce(direct, rays.brought, rays.reflected, ends, irradiance)
+        brought = rays.brought
+        if self.highlights.is_there and self.settings.gather == 1:  # of longer paths nobody knows how they ended
+            texels = points, np.zeros(len(hits), int) if sheets is None else sheets
+            brought = brought + self.highlights_of(EndedRays(ends, rays.reflected, first_key), texels)
+        return bounce(direct, brought, rays.reflected, ends, irradiance)
 
 
 def bounce(

@@ -176,7 +176,12 @@ class ReferenceScene:
 
     def couplings(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(N, 4) how surfaces right below ``points`` take light of grazing angles, see core/faint_gloss.py."""
-        result = np.tile([0.0, 0.0, 0.0, 1.0], (len(points), 1))
+        return self.made_of(points, normals)[0]
+
+    def made_of(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Couplings (N, 4) of surfaces right below ``points`` (N, 3), their mean albedo (N, 3) and material (N,), −1
+        where they have no gloss that is sent evenly."""
+        result = np.tile([0.0, 0.0, 0.0, 1.0], (len(points), 1)), np.zeros((len(points), 3)), np.full(len(points), -1)
         faint = [material.faint_gloss for material in self.snapshot.materials]
         if not any(faint):
             return result
@@ -186,12 +191,14 @@ class ReferenceScene:
         below = np.flatnonzero((hits.triangle >= 0) & (hits.distance < reach))
         number = self.snapshot.material_index[hits.triangle[below]]
         for index, material in enumerate(self.snapshot.materials):
+            if material.faint_gloss is None:
+                continue
             here = below[number == index]
             albedo = np.tile(np.array(material.base_color, float) * material.diffuse_share, (len(here), 1))
             if material.base_image != NO_IMAGE:
                 albedo *= self._image(material.base_image, hits.triangle[here], hits.barycentric[here])[:, :3]
-            if material.faint_gloss is not None:
-                result[here] = couplings(np.repeat(faint_rows([material.faint_gloss]), len(here), axis=0), albedo)
+            rows = np.repeat(faint_rows([material.faint_gloss]), len(here), axis=0)
+            result[0][here], result[1][here], result[2][here] = couplings(rows, albedo), albedo, index
         return result
 
     def _uv_per_metre(self) -> np.ndarray:

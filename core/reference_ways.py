@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from .cubemap import place_directions
-from .gloss import TEXEL_BLUR, GlossyPlaces
+from .gloss import GlossyPlaces
 from .rays import step_off
 from .reference_scene import ReferenceScene, Surfaces, interpolate
 
@@ -80,12 +80,12 @@ class Middle:
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         return np.where(ways.surface.back[:, None], -normal, normal)
 
-    def blur(self) -> np.ndarray:
-        """(G,) least width of lobes in which texels see lamps."""
+    def turn(self) -> np.ndarray:
+        """(G,) radians: how far facets that mirror one way turn from one side of a texel to the other."""
         sides = (0.1, 0.5), (0.9, 0.5), (0.5, 0.1), (0.5, 0.9)
         normals = [self.through(np.tile(side, (len(self.texel), 1))).surface.normal for side in sides]
         bends = [np.linalg.norm(normals[i] - normals[i + 1], axis=1) for i in (0, 2)]
-        return TEXEL_BLUR * (np.pi / 4 / self.face + 1.25 * np.maximum(*bends))
+        return np.pi / 4 / self.face + 1.25 * np.maximum(*bends)
 
     def hides(self, ways: Ways, asked: np.ndarray) -> np.ndarray:
         """(G,) bool: is something before those of ``ways`` that are ``asked`` (G,)?"""

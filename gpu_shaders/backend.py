@@ -26,6 +26,7 @@ from ..core.steps import Pace, Steps
 from .emission_pass import project_emitters
 from .gloss_pass import GlossPass
 from .gradient_pass import GradientPass
+from .highlight_pass import add_highlights
 from .patch_light import PatchLight
 from .places import Places
 from .programs import program
@@ -348,6 +349,10 @@ class GpuBackend:
         gpu.compute.dispatch(shader, len(layers_), 1, 1)
         layers_and_count = (listed, len(layers_))
         add_suns(self.scene, self.settings, self.probe_slots, surfaces.first, layers_and_count, self._field)
+        if self.scene.has_faint_gloss:
+            seen_from = self.probe_slots, surfaces.first, surfaces.textures, layers_and_count
+            parts = self.light.direct_by_part()
+            add_highlights(self.scene, self.settings, seen_from, self._texel_weights, parts, self._field, _GROUP)
         where = surfaces.textures, surfaces.first, layers_and_count
         how = self._texel_weights, irradiance, own_texels, _GROUP, self.gloss, self.light.irradiance
         self._gradient.project(*where, *how)

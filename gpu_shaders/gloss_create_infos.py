@@ -15,7 +15,21 @@ from ..core.gloss import (
     TEXEL_LOOKS,
     TEXEL_RAYS,
 )
-from .create_infos import NO_SURFACE, _emitters, _image, _ints, _light_files, _samplers, _scene, _sheet_files, _sheets
+from ..core.highlights import EMITTER_LOOKS, HIGHLIGHT_BLUR, HIGHLIGHT_STREAM, LAMP_LOOKS
+from ..core.patches import POINTS
+from .create_infos import (
+    _PROBE_FILES,
+    NO_SURFACE,
+    _emitters,
+    _group_sums,
+    _image,
+    _ints,
+    _light_files,
+    _samplers,
+    _scene,
+    _sheet_files,
+    _sheets,
+)
 
 _NUMBERS = {
     "ATTEMPTS": ATTEMPTS,
@@ -38,7 +52,8 @@ def gloss(info, defines: dict, first: int) -> int:
 
 def gloss_files(defines: dict, rays: bool = True) -> list[str]:
     """What follows mirrored ``rays``, to come after what lights points."""
-    return ["gloss_lib", *(["gloss_light_lib", "reflection_lib"] if rays else [])] if "HAS_GLOSS" in defines else []
+    following = ["way_lib", "gloss_light_lib", "reflection_lib"] if rays else []
+    return ["gloss_lib", *following] if "HAS_GLOSS" in defines else []
 
 
 def texel_reflections_comp(info, defines):
@@ -57,7 +72,12 @@ def texel_reflections_comp(info, defines):
         _image(info, 4, "hit_sheets", pixel="R32F")
     _ints(info, "first_slot", "first_layer", "first_probe", "light_count", "seed")
     info.local_group_size(8, 8, 1)
-    files = [*_light_files(defines | {"HAS_ALPHA": True}), *gloss_files(defines), *_sheet_files(defines)]
+    files = [
+        *_light_files(defines | {"HAS_ALPHA": True}),
+        *gloss_files(defines),
+        *_sheet_files(defines),
+        "texel_ways_lib",
+    ]
     return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *files, "texel_reflections_comp"]}
 
 
@@ -68,3 +88,48 @@ def texel_mirrored_comp(info, defines):
     _ints(info, "first_texel", "texel_count")
     info.local_group_size(64, 1, 1)
     return {"compute": ["data_lib", "texel_mirrored_comp"]}
+
+
+def highlight_numbers(info, defines: dict) -> None:
+    """Numbers of gloss_lib and highlight_lib, beside those of ``gloss``."""
+    for name, value in _NUMBERS.items():
+        if "HAS_GLOSS" not in defines:
+            info.define(name, str(value))
+    info.define("HIGHLIGHT_BLUR", str(HIGHLIGHT_BLUR))
+    info.define("HIGHLIGHT_STREAM", f"{HIGHLIGHT_STREAM}u")
+
+
+def _highlights(info, defines: dict) -> int:
+    """What highlight_lib reads, the irradiance of the part of the light that is meant among it."""
+    highlight_numbers(info, {})
+    _ints(info, *(() if "HAS_EMITTERS" in defines else ("first_light", "last_light")), "light_count", "seed")
+    slot = _emitters(info, defines, _scene(info, defines))
+    return _samplers(info, "lights", "part_irradiance", first=slot)
+
+
+def _highlight_files(defines: dict) -> list[str]:
+    return ["coupling_lib", *_light_files(defines | {"HAS_ALPHA": True}), "gloss_lib", *_sheet_files(defines)]
+
+
+def highlight_project_comp(info, defines):
+    info.define("NO_SURFACE", NO_SURFACE)
+    info.define("LOOKS", str(EMITTER_LOOKS if "HAS_EMITTERS" in defines else LAMP_LOOKS))
+    slot = _samplers(info, "probe_slots", "probe_layers", "texel_weights", first=_highlights(info, defines))
+    _samplers(info, "geometry", "albedo", kind="FLOAT_2D_ARRAY", first=_sheets(info, defines, slot))
+    _image(info, 0, "field", access="READ+WRITE")
+    _ints(info, "first_slot")
+    _group_sums(info, defines)
+    own = ["way_lib", "texel_ways_lib", "highlight_lib", "highlight_looks_lib", "highlight_project_comp"]
+    return {"compute": [*_PROBE_FILES, *_highlight_files(defines), *own]}
+
+
+def patch_highlights_comp(info, defines):
+    info.define("PATCH_POINTS", str(POINTS))
+    names = "couplings", "patch_points", "leaving_points", "reflected", "ray_ends"
+    slot = _samplers(info, *names, first=_highlights(info, defines))
+    _sheets(info, defines, slot, "sheet_numbers", "leaving_sheets")
+    _image(info, 0, "highlights", access="READ+WRITE")
+    _ints(info, "first_key", "count", "rays_each")
+    info.local_group_size(64, 1, 1)
+    files = [*_highlight_files(defines), "highlight_lib", "highlight_looks_lib", "patch_highlights_comp"]
+    return {"compute": ["data_lib", "octahedral_lib", *files]}

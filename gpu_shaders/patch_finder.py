@@ -65,7 +65,7 @@ class PatchFinder:
 
     def _known_couplings(self) -> gpu.types.GPUTexture:
         """Couplings of all patches, those found now that are not known yet."""
-        target = self._couplings.reserve(self.count)
+        target = self._couplings.reserve(2 * self.count)
         if self._coupled < self.count:
             find_couplings(self._scene, self.points, POINTS, self._coupled, self.count - self._coupled, target)
             self._coupled = self.count

@@ -15,12 +15,13 @@ import numpy as np
 
 from ..core.extrapolation import STATES, Sums, reduced_rank
 from ..core.grid import Grid
-from ..core.patches import MOST_ROUNDS, RAYS, effort, gather_rays
+from ..core.patches import MOST_ROUNDS, RAYS, Part, effort, gather_rays
 from ..core.settings import BakeSettings
 from ..core.steps import Pace, Steps, run
 from .dispatch import dispatch_linear
 from .growing_array import GrowingArray, copy_elements
-from .patch_direct import PatchDirect, reduce_patches
+from .highlight_pass import EndedRays, find_highlights
+from .patch_direct import PatchDirect, add_patches, reduce_patches
 from .patch_finder import PatchFinder
 from .places import Places, find_couplings
 from .programs import program
@@ -80,6 +81,7 @@ class PatchLight:
         self._direct = PatchDirect(scene, settings, pace)
         self._change = scratch(3 * _CHANGE_GROUPS * STATES, "sums")  # of the iterations that nobody was told of yet
         self._untold = 0
+        self._highlighted: gpu.types.GPUTexture | None = None  # what rays bring, highlights with it, where it is known
         self._brightest: gpu.types.GPUTexture | None = None  # of the light that bounces begin with, where it is known
 
     @property
@@ -100,19 +102,23 @@ class PatchLight:
         if self._direct.count == 0:
             self._direct.effort = effort(self.count, self._settings.samples)
         yield from self._direct.add(self.patches.places, self.count)
-        self._brightest = None
+        self._brightest = self._highlighted = None
 
     def light_again(self, changed: np.ndarray, emitters: bool) -> Steps[int]:
         """Direct light of all patches where lamps ``changed`` (lamp_count,) bool, or sampled ``emitters`` did, in
         steps. Returns the number of lamps that were computed."""
         lamps = yield from self._direct.again(self.patches.places, changed, emitters)
-        self._brightest = None
+        self._brightest = self._highlighted = None
         return lamps
 
     @property
     def direct(self) -> gpu.types.GPUTexture:
         """Irradiance by lamps and sampled emitters, an element a patch."""
         return self._direct.texture
+
+    def direct_by_part(self) -> list[tuple[Part, gpu.types.GPUTexture]]:
+        """The same by each part of the light."""
+        return self._direct.by_part()
 
     # Rays
     # ------------------------------------------------------------------------------------------------------------------
@@ -158,7 +164,7 @@ class PatchLight:
         before = self._reflecting()
         for _ in self._trace_patches(0, self.count):
             yield
-        self._brightest = None
+        self._brightest = self._highlighted = None
         return not (self._reflecting() != before).any()
 
     def _reflecting(self) -> np.ndarray:
@@ -231,10 +237,27 @@ class PatchLight:
         """The first irradiance, of direct light, or one bounce more. ``differences`` tells how they differ; STATES
         iterations may go before it is asked."""
         self._irradiance.insert(0, self._irradiance.pop())
-        brought, ends, reflected = self._brought.texture, self._ends.texture, self._reflected.texture
+        ends, reflected = self._ends.texture, self._reflected.texture
+        brought = self._all_brought() if bounce else self._brought.texture  # of which nothing is asked without a bounce
         patches = _Receivers(self.count, self.direct, brought, ends, reflected, self._rays_each)
         self._bounce(patches, self._irradiance[1], self._irradiance[0], bounce)
         self._compare(*self._irradiance[:3])
+
+    def _all_brought(self) -> gpu.types.GPUTexture:
+        """What rays bring along, and of highlights where they end."""
+        if not self._scene.has_faint_gloss:
+            return self._brought.texture
+        if self._highlighted is None:
+            places = self.patches.places
+            rays = EndedRays(places, self.count, self._rays_each, self._ends.texture, self._reflected.texture)
+            self._highlighted = self._with_highlights(rays, self._brought.texture)
+        return self._highlighted
+
+    def _with_highlights(self, rays: EndedRays, brought: gpu.types.GPUTexture) -> gpu.types.GPUTexture:
+        found, total = allocate(rays.count, "patches"), scratch(rays.count, "patches")
+        find_highlights(self._scene, self._settings.seed, rays, self.patches.places, self.direct_by_part(), found)
+        add_patches(total, rays.count, [brought, found])
+        return total
 
     def _compare(self, new, old, older) -> None:
         if self._brightest is None:
@@ -329,7 +352,7 @@ class PatchLight:
         rays_each = gather_rays(settings.samples)
         direct, result = allocate(count, "texels"), allocate(count, "texels")
         if self._scene.has_faint_gloss:
-            couplings = allocate(count, "texels")
+            couplings = allocate(2 * count, "texels")
             find_couplings(self._scene, texels.points, texels.each, 0, count, couplings)
             texels = replace(texels, couplings=couplings)
         reflects = np.flatnonzero(read(texels.points, count)[:, 3] >= 0)
@@ -338,5 +361,7 @@ class PatchLight:
         reflected, brought = scratch(count * rays_each, "rays"), scratch(count, "texels")
         rays = Rays(texels, 0, count, rays_each, reflected, brought, settings.gather, first_key)
         ends = self.patches.bind_ends(self._trace(rays), rays.total, MOST_ROUNDS - 1)
+        if self._scene.has_faint_gloss and settings.gather == 1:  # of longer paths nobody knows how they ended
+            brought = self._with_highlights(EndedRays(texels, count, rays_each, ends, reflected, first_key), brought)
         self._bounce(_Receivers(count, direct, brought, ends, reflected, rays_each), self._irradiance[0], result)
         return result

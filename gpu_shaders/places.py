@@ -15,8 +15,8 @@ from .scene_textures import SceneTextures
 @dataclass(frozen=True)
 class Places:
     """``points``: ``each`` elements (position, packed normal) for every patch or texel. ``sheets``: the number of the
-    sheet that each is part of, None in scenes without (core/sheets.py). ``couplings``: how each takes light of grazing
-    angles, None where all do alike (core/faint_gloss.py)."""
+    sheet that each is part of, None in scenes without (core/sheets.py). ``couplings``, 2 elements each: how each takes
+    light of grazing angles, see place_coupling_comp; None where all do alike (core/faint_gloss.py)."""
 
     points: gpu.types.GPUTexture
     each: int

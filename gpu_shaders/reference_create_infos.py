@@ -14,7 +14,7 @@ from .create_infos import (
     _sheet_files,
     _sheets,
 )
-from .gloss_create_infos import gloss, gloss_files
+from .gloss_create_infos import gloss, gloss_files, highlight_numbers
 
 
 def probe_paths_comp(info, defines):
@@ -23,6 +23,10 @@ def probe_paths_comp(info, defines):
     slot = _samplers(info, "lights", "probe_points", "world_texels", first=slot)
     slot = _sheets(info, defines, slot)
     gloss(info, defines, slot)
+    highlights = []
+    if "HAS_COUPLING" in defines:
+        highlight_numbers(info, defines)
+        highlights = ["highlight_lib"] if "HAS_GLOSS" in defines else ["gloss_lib", "highlight_lib"]
     _image(info, 0, "directions")
     _image(info, 1, "flux_out")
     _ints(
@@ -31,5 +35,13 @@ def probe_paths_comp(info, defines):
     info.local_group_size(64, 1, 1)
     files = [*_light_files(defines | {"HAS_ALPHA": True}), *gloss_files(defines), *_sheet_files(defines)]
     return {
-        "compute": ["data_lib", "octahedral_lib", "cubemap_lib", *_coupling_files(defines), *files, "probe_paths_comp"]
+        "compute": [
+            "data_lib",
+            "octahedral_lib",
+            "cubemap_lib",
+            *_coupling_files(defines),
+            *files,
+            *highlights,
+            "probe_paths_comp",
+        ]
     }

@@ -93,9 +93,10 @@ float point_share(int group, float density, float distance, float surface_cosine
   return point_density / (point_density + surface_cosine * emitter_cosine * 0.3183098861837907);
 }
 
-/* Irradiance by points on emitters, one shadow ray: sample `index` of the sequence of `key`. */
-vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
+/* Irradiance by points on emitters, one shadow ray, `towards` one of them: sample `index` of the sequence of `key`. */
+vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index, out vec3 towards)
 {
+  towards = normal;
   vec3 best_irradiance = vec3(0.0), best_point = vec3(0.0);
   int best_group = 0;
   float best_weight = 0.0, total = 0.0;
@@ -129,7 +130,8 @@ vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, 
    * the emitter itself. */
   vec3 way = best_point - origin;
   float way_length = max(length(way), 1.0e-20);
-  vec3 arriving = light_along(origin, way / way_length, way_length * 0.9999, best_group);
+  towards = way / way_length;
+  vec3 arriving = light_along(origin, towards, way_length * 0.9999, best_group);
   return best_irradiance * (total / (best_weight * float(CANDIDATES))) * arriving;
 }
 
@@ -145,13 +147,14 @@ bool is_emitter_in_reach(vec3 point)
   return false;
 }
 
-/* Irradiance by a direction about the normal that finds an emitter within emitter_reach. */
-vec3 emitter_direction_irradiance(vec3 origin, vec3 normal, uvec3 key, int index)
+/* Irradiance by a `direction` about the normal that finds an emitter within emitter_reach. */
+vec3 emitter_direction_irradiance(vec3 origin, vec3 normal, uvec3 key, int index, out vec3 direction)
 {
+  direction = normal;
   if (!is_emitter_in_reach(origin)) {
     return vec3(0.0);
   }
-  vec3 direction = sample_cosine(normal, sample_r2(key + uvec3(0u, 0x3C6EF372u, 0u), index));
+  direction = sample_cosine(normal, sample_r2(key + uvec3(0u, 0x3C6EF372u, 0u), index));
   Hit hit = trace_within(origin, direction, emitter_reach);
   if (hit.triangle < 0) {
     return vec3(0.0);
@@ -182,8 +185,9 @@ vec3 emitter_direction_irradiance(vec3 origin, vec3 normal, uvec3 key, int index
 /* Irradiance of all sampled emitters at a surface: sample `index` of the sequences of `key`. */
 vec3 emitter_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
 {
-  return emitter_points_irradiance(point, origin, normal, key, index) +
-         emitter_direction_irradiance(origin, normal, key, index);
+  vec3 direction;
+  vec3 by_points = emitter_points_irradiance(point, origin, normal, key, index, direction);
+  return by_points + emitter_direction_irradiance(origin, normal, key, index, direction);
 }
 
 /* Irradiance by one candidate if nothing stood between: candidate `index` of the sequence of `key`. */

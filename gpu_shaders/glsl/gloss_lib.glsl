@@ -21,6 +21,7 @@ struct Reflection {
   vec3 diffuse;   /* what the surface sends diffusely beside it */
 };
 
+#ifdef HAS_GLOSS
 Gloss gloss_of(int triangle)
 {
   int material = int(element(triangle_attributes, 5 * triangle).w);
@@ -28,6 +29,7 @@ Gloss gloss_of(int triangle)
   vec4 facing = element(gloss_rows, 2 * material + 1);
   return Gloss(share.rgb, share.w, facing.rgb, facing.w != 0.0);
 }
+#endif
 
 /* What facets mirror on average over all directions. */
 vec3 mirrored_in_all(Gloss gloss, vec3 albedo)

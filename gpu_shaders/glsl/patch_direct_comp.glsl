@@ -39,7 +39,7 @@ void main()
   int shift = int(pcg3d(key + uvec3(0u, 0x85EBCA6Bu, 0u)).x % uint(POINTS));
   vec3 irradiance = vec3(0.0);
 #ifdef HAS_COUPLING
-  coupling = element(couplings, patch_index);
+  coupling = element(couplings, 2 * patch_index);
 #endif
 #ifdef HAS_LINKS
   lit_role = role_of_sheet(int(element(sheet_numbers, patch_index).x));

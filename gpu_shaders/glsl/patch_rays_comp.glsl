@@ -46,7 +46,7 @@ void main()
   lit_role = role_of_sheet(own_sheet);
 #endif
 #ifdef HAS_COUPLING
-  coupling = element(couplings, patch_index);
+  coupling = element(couplings, 2 * patch_index);
 #endif
   vec3 origin = leave_surface(at.xyz, normal);
   uvec3 key = uvec3(uint(first_key + patch_index), 0x85EBCA6Bu, uint(seed));

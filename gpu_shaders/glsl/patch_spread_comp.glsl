@@ -18,7 +18,9 @@ float luminance_of_side(vec3 point, vec3 normal, uvec3 key, int index, float sha
   float one = share * dot(emitter_unshadowed(point, normal, key, 2 * index), LUMINANCE);
   float other = share * dot(emitter_unshadowed(point, normal, key, 2 * index + 1), LUMINANCE);
   luminance += 0.5 * (one + other);
-  luminance += share * dot(emitter_direction_irradiance(leave_surface(point, normal), normal, key, index), LUMINANCE);
+  vec3 direction;
+  vec3 near = emitter_direction_irradiance(leave_surface(point, normal), normal, key, index, direction);
+  luminance += share * dot(near, LUMINANCE);
   variance += 0.5 * (one - other) * (one - other) / float(point_count);
 #endif
   return luminance;

@@ -24,6 +24,38 @@ vec2 random_pair(uvec3 key)
   return vec2(pcg3d(key).xy >> 8u) * (1.0 / 16777216.0);
 }
 
+#ifdef HAS_COUPLING
+/* Radiance times π beside the even one that `surface` sends to `view` of light by lamps and emitters, which it adds to
+ * `irradiance`. */
+vec3 highlights_of(int triangle, Surface surface, vec3 origin, vec3 normal, vec3 view, float blur, uvec3 lamp_key,
+                   uvec3 emitter_key, inout vec3 irradiance)
+{
+  FaintGloss faint = faint_gloss_of(int(element(triangle_attributes, 5 * triangle).w));
+  bool is_even = faint.gloss.share == vec3(0.0);
+#ifdef HAS_SHEETS
+  is_even = is_even || share_of_back(sheet_of_triangle(triangle)) != vec3(0.0);
+#endif
+  float width = max(faint.gloss.alpha, blur);
+  vec3 sum = vec3(0.0), direction, arriving;
+  int lamps_each = LAMPS_A_RAY;
+  for (int first = FIRST_LIGHT; first < light_count; first += lamps_each) {
+    int stop = min(first + lamps_each, light_count);
+    arriving = lights_irradiance(first, stop, surface.position, origin, normal, lamp_key, 0, direction);
+    irradiance += arriving;
+    sum += is_even ? vec3(0.0) : arriving * highlight(faint, surface, view, direction, width);
+  }
+#ifdef HAS_EMITTERS
+  arriving = emitter_points_irradiance(surface.position, origin, normal, emitter_key, 0, direction);
+  irradiance += arriving;
+  sum += is_even ? vec3(0.0) : arriving * highlight(faint, surface, view, direction, width);
+  arriving = emitter_direction_irradiance(origin, normal, emitter_key, 0, direction);
+  irradiance += arriving;
+  sum += is_even ? vec3(0.0) : arriving * highlight(faint, surface, view, direction, width);
+#endif
+  return sum * 3.141592653589793;
+}
+#endif
+
 void store(int entry, int part, vec3 direction, float behind, vec3 flux)
 {
   ivec2 place = element_position(3 * entry + part);
@@ -136,9 +168,19 @@ void main()
     normal *= side;
 #endif
     origin = step_off(surface.position, normal, -side * direction, hit.distance);
-    vec3 irradiance = lamps_irradiance(surface.position, origin, normal, segment_key + uvec3(1u, 0u, 0u), 0);
+    uvec3 lamp_key = segment_key + uvec3(1u, 0u, 0u), emitter_key = segment_key + uvec3(5u, 0u, 0u);
+#ifdef HAS_COUPLING
+    vec3 irradiance = vec3(0.0);
+    float blur = segment == 0 ? 0.1 : PATCH_BLUR;
+    vec3 highlighted = highlights_of(
+        hit.triangle, surface, origin, normal, -direction, blur, lamp_key, emitter_key, irradiance);
+    irradiance += highlighted / max(surface.albedo, vec3(1.0e-9));
+    coupling = surface.coupling;
+#else
+    vec3 irradiance = lamps_irradiance(surface.position, origin, normal, lamp_key, 0);
 #ifdef HAS_EMITTERS
-    irradiance += emitter_irradiance(surface.position, origin, normal, segment_key + uvec3(5u, 0u, 0u), 0);
+    irradiance += emitter_irradiance(surface.position, origin, normal, emitter_key, 0);
+#endif
 #endif
     radiance += throughput * irradiance * 0.3183098861837907;
     direction = sample_cosine(normal, random_pair(segment_key + uvec3(2u, 0u, 0u)));

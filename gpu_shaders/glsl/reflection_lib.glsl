@@ -5,21 +5,6 @@
  * Reference: core/reference_gloss.py. Samplers beside those of its libraries: world_texels.
  */
 
-/* A ray that has met `surface`. */
-struct Way {
-  vec3 direction;
-  Hit hit;
-  Surface surface;
-  vec3 throughput; /* 0 where nothing more can come */
-  vec3 brought;
-};
-
-/* Where rays begin that leave the surface that was met. */
-vec3 beginning(Way way)
-{
-  return step_off(way.surface.position, way.surface.normal, -way.direction, way.hit.distance);
-}
-
 /* The ray goes on from its surface by `reflection`, out of a lobe of this width. */
 void go_on(inout Way way, Reflection reflection, float width, bool meets_lamps, float spread)
 {

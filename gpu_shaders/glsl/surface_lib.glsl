@@ -7,7 +7,7 @@
  *   materials, 3 elements: diffuse albedo, base image | emission, emission image | alpha, threshold, alpha image, alpha
  *     from colour
  *   tints, 1 element a material: what its holes leave of light, image
- *   faint_gloss, 2 elements a material: see core/faint_gloss.py
+ *   faint_gloss, 3 elements a material: see core/faint_gloss.py
  *   image_table, 1 element: first row in image_texels, width, height, extension
  *   image_texels: linear RGBA, mip levels of an image one after the other
  */
@@ -121,6 +121,7 @@ struct Surface {
   float emitter_density; /* per m²; 0 where rays find the emission by themselves */
 #ifdef HAS_FAINT_GLOSS
   vec4 coupling; /* see coupling_lib */
+  vec3 mean_albedo; /* over all views */
 #endif
 };
 
@@ -129,11 +130,12 @@ struct Surface {
 void send_faint_gloss(inout Surface surface, int material, float cosine)
 {
   surface.coupling = vec4(0.0, 0.0, 0.0, 1.0);
-  vec4 share = element(faint_gloss, 2 * material);
+  surface.mean_albedo = surface.albedo;
+  vec4 share = element(faint_gloss, 3 * material);
   if (share.rgb == vec3(0.0)) {
     return;
   }
-  vec4 slope = element(faint_gloss, 2 * material + 1);
+  vec4 slope = element(faint_gloss, 3 * material + 1);
   vec3 whole = slope.w != 0.0 ? min(share.rgb, surface.albedo) : surface.albedo * share.rgb;
   float grazing = pow(clamp(1.0 - cosine, 0.0, 1.0), share.w) - 2.0 / ((share.w + 1.0) * (share.w + 2.0));
   vec3 mirrored = min(whole * (1.0 + slope.rgb * grazing), vec3(1.0));

@@ -12,40 +12,6 @@
  * Reference: core/reference_gloss.py.
  */
 
-/* The ray through `place` (0..1) of a texel to the plane of what its `middle` has met; the middle itself where that
- * slants too much. */
-Way way_through(vec2 place, Way middle, vec3 origin, ivec2 texel)
-{
-  Way way = middle;
-  vec3 geometric = triangle_normal(middle.hit.triangle, -middle.direction);
-  vec3 direction = texel_place_direction(texel, place);
-  float slope = dot(geometric, direction), distance = dot(geometric, middle.surface.position - origin) / slope;
-  if (slope > -0.01 || distance > 2.0 * middle.hit.distance) {
-    return way;
-  }
-  way.direction = direction;
-  way.hit.distance = distance;
-  way.surface.position = origin + distance * direction;
-  vec2 barycentric = barycentric_of(middle.hit.triangle, way.surface.position);
-  int first = 5 * middle.hit.triangle;
-  vec3 normal = normalize(interpolate(element(triangle_attributes, first).xyz,
-                                      element(triangle_attributes, first + 1).xyz,
-                                      element(triangle_attributes, first + 2).xyz, barycentric));
-  way.surface.normal = middle.surface.back ? -normal : normal;
-  return way;
-}
-
-/* Least width of lobes in which the texel sees lamps: so wide that places in it do not miss one between them. */
-float blur_of(Way middle, vec3 origin, ivec2 texel)
-{
-  vec3 left = way_through(vec2(0.1, 0.5), middle, origin, texel).surface.normal;
-  vec3 right = way_through(vec2(0.9, 0.5), middle, origin, texel).surface.normal;
-  vec3 low = way_through(vec2(0.5, 0.1), middle, origin, texel).surface.normal;
-  vec3 high = way_through(vec2(0.5, 0.9), middle, origin, texel).surface.normal;
-  float bend = 1.25 * max(length(right - left), length(high - low));
-  return TEXEL_BLUR * (0.5 * 1.5707963267948966 / float(FACE) + bend);
-}
-
 /* Radiance of lamps that a ray which leaves `way` along `direction` meets. */
 vec3 lamps_mirrored(Way way, vec3 direction, float width)
 {
@@ -59,23 +25,6 @@ vec3 lamps_mirrored(Way way, vec3 direction, float width)
 bool is_hidden(Way way, vec3 origin)
 {
   return trace_any(origin, way.direction, way.hit.distance * 0.999);
-}
-
-/* What the ray through the middle of a texel has met on `triangle`. */
-Way met_in_middle(int triangle, float distance, vec3 origin, vec3 direction)
-{
-  vec2 barycentric = barycentric_of(triangle, origin + direction * distance);
-  Surface surface = resolve_surface(triangle, barycentric, origin, direction, 2.0 / float(FACE));
-  vec2 inside = max(barycentric, vec2(0.0)); /* rasterised triangles reach over their edges, see texel_hits_comp */
-  inside /= max(inside.x + inside.y, 1.0);
-  if (inside != barycentric) {
-    barycentric = inside;
-    surface.position = interpolate(element(triangle_corners, 3 * triangle).xyz,
-                                   element(triangle_corners, 3 * triangle + 1).xyz,
-                                   element(triangle_corners, 3 * triangle + 2).xyz, inside);
-  }
-  surface.albedo *= passed_to(origin, direction, distance * 0.9999);
-  return Way(direction, Hit(distance, triangle, barycentric), surface, vec3(1.0), vec3(0.0));
 }
 
 /* Radiance of lamps that the texel mirrors, in a lobe of this width: the mean of looks from places all over it. */
@@ -126,7 +75,9 @@ void main()
     lit_role = role_of_triangle(triangle);
 #endif
     middle = met_in_middle(triangle, abs(seen.z), slot.xyz, direction);
-    width = max(gloss.alpha, blur_of(middle, slot.xyz, id.xy));
+    middle.surface.albedo *= passed_to(slot.xyz, direction, abs(seen.z) * 0.9999);
+    /* so wide that places in the texel do not miss a lamp between them */
+    width = max(gloss.alpha, TEXEL_BLUR * turn_over(middle, slot.xyz, id.xy));
     brought = lamps_looked_at(gloss, middle, slot.xyz, id.xy, width, place_key, light_key);
   }
   for (int ray = 0; ray < REFLECTIONS; ray++) {

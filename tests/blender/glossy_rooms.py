@@ -130,6 +130,17 @@ def all_of_plastic(scene, grey):
     panel(scene)
 
 
+def plastic_in_the_sun(scene, grey):
+    """The same with a window, and a patch of sun on the floor and the box."""
+    plain = principled("Plastic", Base_Color=(grey, grey, grey), Roughness=0.5)
+    shell(scene, PLAIN_M, (1.0, 2.0, 0.9, 2.2), **dict.fromkeys(SIDES, plain))
+    scenes.add_box(scene, "Box", (1.6, 1.7, 0), (2.3, 2.4, 1.1), plain)
+    background = next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
+    background.inputs["Color"].default_value = (0.6, 0.8, 1.0, 1.0)
+    sun = scenes.add_light(scene, "SUN", (0, 0, 5), energy=8.0, angle=0.0092)
+    sun.rotation_euler = (np.radians(50), 0, np.radians(8))
+
+
 def coloured_plastic(scene):
     def plain(name, color):
         return principled(name, Base_Color=color, Roughness=0.5)
@@ -160,6 +171,7 @@ ROOMS = {
     "plastic 0.5, white": (plastic, 0.5, 0.8),
     "all of white plastic": (all_of_plastic, 0.8),
     "all of grey plastic": (all_of_plastic, 0.3),
+    "grey plastic in the sun": (plastic_in_the_sun, 0.2),
     "coloured plastic": (coloured_plastic,),
 }
 

@@ -70,15 +70,13 @@ def show(name, gloss, diffuse, noise, floor):
 def test_gloss_against_cycles(gpu_context, name):
     gloss, diffuse, noise, floor = measured(name, 10, 128)
     show(name, gloss, diffuse, noise, floor)
-    # Of gloss that is not followed the images of lamps are missing, which a darker surface does not outshine.
-    is_dark = name == "all of grey plastic"
-    assert gloss.relative_rms < 1.5 * (floor + noise) + (0.03 if is_dark else 0.015)
+    assert gloss.relative_rms < 1.5 * (floor + noise) + 0.015
     assert gloss.relative_rms < 1.02 * diffuse.relative_rms
 
 
-@pytest.mark.parametrize("name", ["coated wood", "all of white plastic"])
+@pytest.mark.parametrize("name", ["coated wood", "all of grey plastic"])
 def test_gloss_helps(gpu_context, name):
-    """Followed or sent by angles: two of these rooms, quickly."""
+    """Followed, or sent by angles with highlights: two of these rooms, quickly."""
     gloss, diffuse, noise, floor = measured(name, 3, 8)
     show(name, gloss, diffuse, noise, floor)
-    assert gloss.relative_rms < 0.5 * diffuse.relative_rms + noise
+    assert gloss.relative_rms < 0.3 * diffuse.relative_rms + noise

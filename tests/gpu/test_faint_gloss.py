@@ -5,14 +5,27 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gridlight.core import reference_highlights
+from gridlight.core import spherical_harmonics as sh
 from gridlight.core.emitters import sampling_density
 from gridlight.core.gloss import Gloss
 from gridlight.core.grid import Grid
 from gridlight.core.settings import BakeSettings
 from gridlight.core.snapshot import Light, Material
+from gridlight.gpu_shaders.highlight_pass import EndedRays, add_highlights, find_highlights
 from gridlight.gpu_shaders.probe_paths import ProbePaths
 from gridlight.gpu_shaders.scene_textures import SceneTextures
-from small_scenes import all_lights, bake, box, cluttered_room, frame, snapshot_of, with_small_emitter
+from gridlight.gpu_shaders.textures import allocate, numbers, read
+from small_scenes import (
+    all_lights,
+    bake,
+    box,
+    cluttered_room,
+    frame,
+    irradiance_at_nodes,
+    snapshot_of,
+    with_small_emitter,
+)
 from stages import Stages
 
 GRID = Grid.from_bounds([-0.6, -0.5, -0.1], [0.7, 0.5, 0.1], (2, 2, 1))
@@ -78,6 +91,71 @@ def test_rays(stages, segments):
     alike = (np.abs(reflected - rays.reflected).max(axis=-1) < 5e-3)[same].mean()
     assert alike > (0.97 if segments == 1 else 0.92)
     assert close(brought, rays.brought, 1e-2)[same.all(axis=1)].mean() > 0.9
+
+
+def light_by_part(stages):
+    """What the GPU found that each part of the light does to patches, for the twin as well."""
+    stages.direct()
+    count, light = stages.light.count, stages.reference.light
+    light.direct_by_part = {
+        part: read(values, count)[:, :3].astype(float) for part, values in stages.light.direct_by_part()
+    }
+    return count
+
+
+def test_highlights_of_texels(stages):
+    light_by_part(stages)
+    nodes, surfaces = np.arange(stages.gpu.count), stages.surfaces()
+    backend, listed = stages.backend, numbers(np.arange(stages.gpu.count), "test")
+    backend.allocate_field()
+    where = backend.probe_slots, 0, stages.gpu.textures, (listed, len(nodes))
+    parts = stages.light.direct_by_part()
+    add_highlights(backend.scene, stages.settings, where, backend._texel_weights, parts, backend._field, 64)
+    found, reference = backend.read_field(), stages.reference
+    sent = reference.highlights(surfaces, stages.patch())
+    expected = sh.project(sent, reference.directions, reference.solid_angles, stages.settings.bands)
+    assert np.abs(expected).max() > 0.01, "there are some"
+    np.testing.assert_allclose(found, expected, atol=0.02 * np.abs(expected).max())
+
+
+def test_highlights_where_rays_end(stages):
+    found = stages.connect()
+    count = light_by_part(stages)
+    light = stages.reference.light
+    light.patches.points = stages.points
+    result, places = allocate(count, "test"), stages.light.patches.places
+    rays = stages.light
+    ended = EndedRays(places, count, rays._rays_each, rays._ends.texture, rays._reflected.texture)
+    find_highlights(stages.backend.scene, stages.settings.seed, ended, places, rays.direct_by_part(), result)
+    expected = light.highlights_of(reference_highlights.EndedRays(found.ends, found.reflected))
+    result = read(result, count)[:, :3]
+    assert close(result, expected, 2e-2).mean() > 0.97
+    direct = read(stages.light.direct, count)[:, :3]
+    assert np.abs(expected).max() > 0.01 * direct.max(), "there are some"
+
+
+@pytest.mark.any_version
+def test_it_is_nearly_what_following_it_finds(gpu_context):
+    """The same plastic in both ways under two lamps and a small emitter: by rays, and by highlights."""
+    walls = box((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0))[:, ::-1]
+    glowing = box((-0.7, -0.9, 0.3), (-0.6, -0.8, 0.4))
+    lamps = [
+        Light("lamp", "AREA", (9.0, 9.0, 9.0), frame((0.0, 0.3, 0.95)), size_x=0.3, size_y=0.3),
+        Light("spot", "POINT", (0.6, 0.3, 0.1), frame((0.6, -0.5, 0.2)), radius=0.05),
+    ]
+    grid = Grid.from_bounds([-0.6] * 3, [0.6] * 3, (2, 2, 2))
+    gloss = replace(PLASTIC, share=(0.056, 0.056, 0.056))
+
+    def irradiance(**kind):
+        materials = [Material("plastic", (0.25, 0.2, 0.2), **kind), Material("glowing", (0, 0, 0), (20.0, 20.0, 20.0))]
+        corners, material = np.concatenate([walls, glowing]), [0] * len(walls) + [1] * len(glowing)
+        snapshot = snapshot_of(corners, material, materials, lights=lamps)
+        return irradiance_at_nodes(bake(snapshot, grid, BakeSettings(keep_all=True, face=8)).field)
+
+    followed, sent, none = irradiance(gloss=gloss), irradiance(faint_gloss=gloss), irradiance()
+    scale = np.sqrt((followed**2).mean())
+    assert np.sqrt(((sent - followed) ** 2).mean()) < 0.02 * scale
+    assert np.sqrt(((none - followed) ** 2).mean()) > 0.06 * scale, "it makes a difference"
 
 
 @pytest.mark.any_version

@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Looks at lamps and sampled emitters, for highlights of a patch's light. */
+
+struct Look {
+  vec3 sum; /* of highlights by weight */
+  float weight;
+};
+
+void add_look(inout Look look, FaintGloss faint, Surface surface, vec3 view, vec3 towards, vec3 irradiance, float width)
+{
+  float weight = abs(irradiance.r) + abs(irradiance.g) + abs(irradiance.b);
+  if (weight > 0.0) {
+    look.sum += weight * highlight(faint, surface, view, towards, width);
+    look.weight += weight;
+  }
+}
+
+/* Looks at the part of the light that is meant, as if nothing stood between: with HAS_EMITTERS a point on a sampled
+ * emitter, else a place on each of the lamps first_light .. last_light. */
+void look_at_part(inout Look look, FaintGloss faint, Surface surface, vec3 view, float width, uvec3 key, int index)
+{
+  coupling = surface.coupling;
+#ifdef HAS_EMITTERS
+  EmitterSample emitter = sample_emitter(sample_r3(key, index));
+  vec3 offset = emitter.point - surface.position;
+  float squared = max(dot(offset, offset), 1.0e-20);
+  vec3 towards = offset * inversesqrt(squared);
+  float cosine = max(dot(towards, surface.normal), 0.0);
+  vec3 irradiance = emitter.radiance * (cosine * abs(dot(towards, emitter.normal)) / (squared * emitter.density));
+  add_look(look, faint, surface, view, towards, irradiance * coupled(cosine), width);
+#else
+  vec2 u = sample_r2(key, index);
+  for (int light = first_light; light < last_light; light++) {
+    LightSample light_sample = sample_light(light, surface.position, u);
+    vec3 irradiance = unshadowed_irradiance(light, light_sample, surface.normal);
+    add_look(look, faint, surface, view, light_sample.direction, irradiance, width);
+  }
+#endif
+}
