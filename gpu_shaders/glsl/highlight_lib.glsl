@@ -30,8 +30,8 @@ vec3 albedo_at(FaintGloss faint, vec3 mean_albedo, float cosine)
   return mirrored + (mean_albedo - whole) * (1.0 - mirrored) / max(1.0 - whole, vec3(1.0e-3));
 }
 
-/* Radiance that a lobe of this `width` sends to `view` beyond what is sent there evenly, for each unit of irradiance that
- * arrives from `towards` and counts by the surface's coupling. */
+/* Radiance that a lobe of this `width` sends to `view` beyond what is sent there evenly, for each unit of irradiance
+ * that arrives from `towards` and counts by the surface's coupling. */
 vec3 highlight(FaintGloss faint, Surface surface, vec3 view, vec3 towards, float width)
 {
   float arriving = dot(towards, surface.normal);
