@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* What patches get of highlights of lamps in gloss that is not followed, beyond what such gloss sends them evenly: a
- * part of the light at the patches where their rays end, sent back along the ray in lobes. Reference: core/highlights.py.
+ * part of the light at the patches where their rays end, sent back along the ray in lobes.
+ * Reference: core/highlights.py.
  *
  * Directions are those of patch_rays_comp. Adds to `highlights` of each patch.
  * part_irradiance: of that part alone, an element a patch; couplings, 2 elements a patch: see place_coupling_comp
