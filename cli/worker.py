@@ -98,6 +98,9 @@ def leave(status: int) -> None:
 def run_in_child(argv: list[str], say, needs_gpu: bool, verbose: bool, start: Path) -> tuple[int, int]:
     """Runs ``argv`` in a child that begins with ``start``. Returns (exit status, child's process id); ``say`` prints
     one line for the user."""
+    if sys.platform == "win32":  # neither process groups nor held-back signals
+        say("on Windows this command runs inside Blender: blender -b FILE.blend --command gridlight COMMAND …")
+        return 2, 0
     problem = system_libraries.ensure(say)
     if problem:
         say(problem)

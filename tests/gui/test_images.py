@@ -130,7 +130,7 @@ def test_report_panel_is_like_its_picture(person):
     field.metadata |= {
         "converged": True,
         "scene": {"frame": 1},
-        "warnings": ["material 'Chrome' is metal: it reflects in all directions"],
+        "warnings": ["glass lets light through unbent: 'Pane'"],
     }
     seconds = {"read": 0.02, "cull": 0.01, "capture": 0.42, "light": 0.31}
     storage.store_field(volume, field, "known light", {"seconds": seconds, "bounces": 8})
