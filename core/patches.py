@@ -54,7 +54,7 @@ _AXIS_BITS = 18
 _SHEET_KEY = np.uint64(0x9E3779B97F4A7C15)  # odd: tells the cells of one sheet from those of another
 _SCRAMBLE, _UNSCRAMBLE = np.uint32(0x9E3779B1), np.uint32(0x0E8B2F51)  # inverse to each other modulo 2³²
 _NOBODY = np.uint32(0xFFFFFFFF)
-MOST_ROUNDS = 12  # of rays that find surface which nothing has seen before
+MOST_ROUNDS = 8  # of rays that find surface which nothing has seen before
 _COARSEST = 3  # levels by which patches grow that only rays see
 
 

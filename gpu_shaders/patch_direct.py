@@ -13,14 +13,15 @@ import numpy as np
 from ..core.patches import ALL, EMITTERS, SAMPLES, Part, lamps_a_ray, light_parts, spread_points
 from ..core.settings import BakeSettings
 from ..core.steps import Pace, Steps
-from .dispatch import compaction_groups, compaction_run, dispatch_linear
+from .dispatch import compaction_groups, compaction_run, dispatch_linear, is_software
 from .growing_array import GrowingArray, Scratch, fill_elements
 from .places import Places
 from .programs import program
 from .scene_textures import SceneTextures
 from .textures import read
 
-_SAMPLES_EACH = 2  # of one lamp, or of emitters, that a thread takes
+_SAMPLES_EACH = 2  # of one lamp, or of emitters, that a thread takes in software
+_POINTS_SIDE_BY_SIDE = 4  # of a patch on a GPU, where few patches are lit as long as one takes
 _LAMPS_AT_ONCE = 32  # that a thread takes, where each gets a ray
 _SAMPLES_AT_ONCE = 1 << 20
 _MOST_LISTS, _MOST_TERMS = 4, 4  # that a shader takes
@@ -176,7 +177,8 @@ class PatchDirect:
     def find_spread(self, part: Part, places: Places, first: int, stop: int, spread) -> None:
         """Mean and standard deviation of the luminance at the points of patches ``first`` .. ``stop`` if nothing stands
         between, into ``spread`` (RG32F)."""
-        shader = program("patch_spread_comp", POINTS=places.each, **self._defines(part))
+        lanes = 1 if is_software() else _POINTS_SIDE_BY_SIDE
+        shader = program("patch_spread_comp", POINTS=places.each, LANES=lanes, **self._defines(part))
         self._bind(shader, part, places)
         shader.image("spread", spread)
         for name, value in (
@@ -186,7 +188,7 @@ class PatchDirect:
             ("seed", self._settings.seed),
         ):
             shader.uniform_int(name, (value,))
-        dispatch_linear(shader, stop - first)
+        dispatch_linear(shader, (stop - first) * lanes)
 
     # Samples
     # ------------------------------------------------------------------------------------------------------------------
@@ -205,7 +207,7 @@ class PatchDirect:
         work = sum(count * samples for _first, count, samples in lists)
         for begins, portion in enumerate(self._portions(part)):
             rays = -(-(portion[1] - portion[0]) // self._lamps_a_ray) if isinstance(portion, tuple) else 1
-            samples_each = max(1, _SAMPLES_EACH // rays)
+            samples_each = max(1, _SAMPLES_EACH // rays) if is_software() else 1
 
             def light(start: int, number: int, portion=portion, samples_each=samples_each, begins=begins == 0) -> None:
                 some = _cut(lists, start, start + number)

@@ -4,8 +4,8 @@
  *
  * Some points tell it well enough (core/patches.py: spread_points). Points on emitters are random themselves, but a
  * sample's candidates average that (emitter_lib.glsl): two at each place tell the two variances apart.
- * Dispatch: one thread a patch from first_patch on; groups of 64. Writes mean and standard deviation of the luminance
- * of one sample's irradiance.
+ * Dispatch: LANES threads a patch from first_patch on, which share its points; groups of 64. Writes mean and standard
+ * deviation of the luminance of one sample's irradiance.
  */
 
 const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
@@ -26,19 +26,19 @@ float luminance_of_side(vec3 point, vec3 normal, uvec3 key, int index, float sha
   return luminance;
 }
 
-void main()
+#if LANES > 1
+SHARED_ vec3 shares[64];
+#endif
+
+/* Over a lane's points: of luminances, of their squares, of what candidates differ by. */
+vec3 sums_of_points(int patch_index, int lane)
 {
-  int entry = LINEAR_THREAD;
-  if (entry >= patch_count) {
-    return;
-  }
-  int patch_index = first_patch + entry;
   uvec3 key = uvec3(uint(patch_index), 0u, uint(seed));
 #ifdef HAS_LINKS
   lit_role = role_of_sheet(int(element(sheet_numbers, patch_index).x));
 #endif
   float sum = 0.0, squares = 0.0, candidate_variance = 0.0;
-  for (int i = 0; i < point_count; i++) {
+  for (int i = lane; i < point_count; i += LANES) {
     vec4 at = element(patch_points, POINTS * patch_index + POINTS / point_count * i);
     vec3 normal = unpack_normal(at.w);
 #ifdef HAS_SHEETS
@@ -53,10 +53,32 @@ void main()
     sum += luminance;
     squares += luminance * luminance;
   }
-  float mean = sum / float(point_count);
-  float variance = max(squares / float(point_count) - mean * mean - 0.5 * candidate_variance, 0.0);
+  return vec3(sum, squares, candidate_variance);
+}
+
+void main()
+{
+  int entry = LINEAR_THREAD / LANES;
+  int patch_index = first_patch + entry;
+  vec3 sums = entry < patch_count ? sums_of_points(patch_index, LINEAR_THREAD % LANES) : vec3(0.0);
+#if LANES > 1
+  int thread_index = int(gl_LocalInvocationID.x);
+  shares[thread_index] = sums;
+  barrier();
+  for (int lane = 1; lane < LANES && thread_index % LANES == 0; lane++) {
+    sums += shares[thread_index + lane];
+  }
+  if (thread_index % LANES != 0) {
+    return;
+  }
+#endif
+  if (entry >= patch_count) {
+    return;
+  }
+  float mean = sums.x / float(point_count);
+  float variance = max(sums.y / float(point_count) - mean * mean - 0.5 * sums.z, 0.0);
 #ifdef HAS_EMITTERS
-  variance += candidate_variance / float(CANDIDATES);
+  variance += sums.z / float(CANDIDATES);
 #endif
   imageStore(spread, element_position(patch_index), vec4(mean, sqrt(variance), 0.0, 0.0));
 }
