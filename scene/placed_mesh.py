@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..core.kept import Kept
 from .geometry import MeshArrays, place
 from .materials import apply_domain
 from .shader_values import Domain
@@ -26,13 +27,20 @@ class PlacedMesh:
     matrices: np.ndarray  # (I, 4, 4) float64
 
 
+_MOST_KEPT = 1 << 20  # triangles: of more it takes too long to follow one that moves whatever is kept
+_kept_surfaces: list[Kept] = []  # of each group by its place: all but one, where something moves, are what they were
+
+
 def joined_surface(placed: list[PlacedMesh]) -> tuple[dict[str, np.ndarray], list[tuple[int, int]]]:
     """The arrays of ``SceneSnapshot`` that describe surface, by name, and (number in ``placed``, slot) of textures
     whose UV map the mesh does not have: one point of them shows all over."""
     parts, without_uvs = [], []
     objects = 0
+    keeps = sum(len(group.mesh.triangles) * len(group.matrices) for group in placed) <= _MOST_KEPT
     for index, group in enumerate(placed):
-        part, missing = _world_surface(group, objects)
+        if keeps and index == len(_kept_surfaces):
+            _kept_surfaces.append(Kept(_world_surface, last=1))
+        part, missing = (_kept_surfaces[index] if keeps else _world_surface)(group, objects)
         objects += len(group.matrices)
         without_uvs += [(index, slot) for slot in missing]
         if part is not None:
@@ -84,7 +92,7 @@ def _corner_uvs(mesh: MeshArrays, slots: np.ndarray, domains: list[Domain | None
 
 
 def _joined(parts: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    """One array per field; vertex indices move behind the parts before."""
+    """One array per field; vertex indices move behind the parts before. The parts stay as they are."""
     if not parts:
         return {
             "vertices": np.empty((0, 3)),
@@ -94,8 +102,7 @@ def _joined(parts: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
             "material_index": np.empty(0, np.int32),
             "object_index": np.empty(0, np.int32),
         }
-    offset = 0
-    for part in parts:
-        part["triangles"] += offset
-        offset += len(part["vertices"])
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    before = np.cumsum([0, *(len(part["vertices"]) for part in parts[:-1])], dtype=np.int32)
+    joined["triangles"] += np.repeat(before, [len(part["triangles"]) for part in parts])[:, None]
+    return joined
