@@ -47,6 +47,48 @@ Candidate candidate(vec3 origin, uvec3 key, int index)
   return result;
 }
 
+/* Lists in chosen_ones the candidates of a probe at `origin` that get a ray, and returns how many there are; `step` is
+ * the weight that each ray stands for. All threads of the group must call it. */
+int choose_candidates(vec3 origin, uvec3 key, int lane, out float step)
+{
+  float weights[RUN], run_weight = 0.0;
+  int rays[RUN];
+  for (int i = 0; i < RUN; i++) {
+    weights[i] = candidate(origin, key, lane * RUN + i).weight;
+    rays[i] = 0;
+    run_weight += weights[i];
+  }
+  run_weights[lane] = run_weight;
+  barrier();
+  float before = 0.0, total = 0.0;
+  for (int i = 0; i < GROUP; i++) {
+    before += i < lane ? run_weights[i] : 0.0;
+    total += run_weights[i];
+  }
+  step = total / float(RAYS);
+  int chosen = 0;
+  for (int i = 0; i < RUN && total > 0.0; i++) {
+    float after = before + weights[i];
+    rays[i] = int(floor(after / step + 0.5) - floor(before / step + 0.5));
+    chosen += rays[i] > 0 ? 1 : 0;
+    before = after;
+  }
+  run_chosen[lane] = chosen;
+  barrier();
+  int place = 0, chosen_count = 0;
+  for (int i = 0; i < GROUP; i++) {
+    place += i < lane ? run_chosen[i] : 0;
+    chosen_count += run_chosen[i];
+  }
+  for (int i = 0; i < RUN; i++) {
+    if (rays[i] > 0 && place < RAYS) {
+      chosen_ones[place++] = ivec2(lane * RUN + i, rays[i]);
+    }
+  }
+  barrier();
+  return min(chosen_count, RAYS);
+}
+
 void main()
 {
   int lane = int(gl_LocalInvocationID.x);
@@ -75,43 +117,10 @@ void main()
     }
   }
   uvec3 key = uvec3(uint(slot.w), 0xB5297A4Du, uint(seed));
-  float weights[RUN], run_weight = 0.0;
-  int rays[RUN];
-  for (int i = 0; i < RUN; i++) {
-    weights[i] = candidate(slot.xyz, key, lane * RUN + i).weight;
-    rays[i] = 0;
-    run_weight += weights[i];
-  }
-  run_weights[lane] = run_weight;
-  barrier();
-  float before = 0.0, total = 0.0;
-  for (int i = 0; i < GROUP; i++) {
-    before += i < lane ? run_weights[i] : 0.0;
-    total += run_weights[i];
-  }
-  float step = total / float(RAYS);
-  int chosen = 0;
-  for (int i = 0; i < RUN && total > 0.0; i++) {
-    float after = before + weights[i];
-    rays[i] = int(floor(after / step + 0.5) - floor(before / step + 0.5));
-    chosen += rays[i] > 0 ? 1 : 0;
-    before = after;
-  }
-  run_chosen[lane] = chosen;
-  barrier();
-  int place = 0, chosen_count = 0;
-  for (int i = 0; i < GROUP; i++) {
-    place += i < lane ? run_chosen[i] : 0;
-    chosen_count += run_chosen[i];
-  }
-  for (int i = 0; i < RUN; i++) {
-    if (rays[i] > 0 && place < RAYS) {
-      chosen_ones[place++] = ivec2(lane * RUN + i, rays[i]);
-    }
-  }
-  barrier();
+  float step;
+  int chosen_count = choose_candidates(slot.xyz, key, lane, step);
   /* the nearest lamp may get all rays, and few threads have it in their runs */
-  for (int i = lane; i < min(chosen_count, RAYS); i += GROUP) {
+  for (int i = lane; i < chosen_count; i += GROUP) {
     Candidate chosen = candidate(slot.xyz, key, chosen_ones[i].x);
     vec3 arriving = light_along(slot.xyz, chosen.direction, chosen.distance * 0.9999, 0);
     if (arriving != vec3(0.0)) {

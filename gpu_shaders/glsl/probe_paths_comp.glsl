@@ -63,6 +63,40 @@ void store(int entry, int part, vec3 direction, float behind, vec3 flux)
   imageStore(flux_out, place, vec4(flux, 0.0));
 }
 
+/* From one point on the sampled emitters; in the direction `towards`. */
+vec3 flux_of_emitters(vec3 start, uvec3 key, int number, out vec3 towards)
+{
+  vec3 flux = vec3(0.0);
+  towards = vec3(0.0, 0.0, 1.0);
+#ifdef HAS_EMITTERS
+  EmitterSample emitter = sample_emitter(sample_r3(key + uvec3(0u, 1u, 0u), number));
+  vec3 offset = emitter.point - start;
+  float distance = max(length(offset), 1.0e-10);
+  towards = offset / distance;
+  float cosine = abs(dot(towards, emitter.normal));
+  flux = emitter.radiance * (cosine / (emitter.density * distance * distance) *
+                             share_of_points(emitter.density, distance, cosine));
+  if (flux != vec3(0.0)) {
+    flux *= light_along(start, towards, distance * 0.9999, 0);
+  }
+#endif
+  return flux;
+}
+
+/* From one place on a sun of the world; in the direction `towards`. */
+vec3 flux_of_suns(vec3 start, uvec3 key, int number, out vec3 towards)
+{
+  towards = vec3(0.0, 0.0, 1.0);
+  int suns = light_count - first_sun;
+  if (suns == 0) {
+    return vec3(0.0);
+  }
+  LightSample light_sample = sample_light(
+      first_sun + number % suns, start, sample_r2(key + uvec3(0u, 2u, 0u), number));
+  towards = light_sample.direction;
+  return light_sample.irradiance * float(suns) * light_along(start, towards, NO_HIT, 0);
+}
+
 void main()
 {
   int entry = LINEAR_THREAD;
@@ -76,29 +110,10 @@ void main()
   uvec3 own_key = pcg3d(key + uvec3(0u, uint(number), 0u));
   vec3 start = element(probe_points, probe).xyz;
 
-  vec3 towards = vec3(0.0, 0.0, 1.0), flux = vec3(0.0);
-#ifdef HAS_EMITTERS
-  EmitterSample emitter = sample_emitter(sample_r3(key + uvec3(0u, 1u, 0u), number));
-  vec3 offset = emitter.point - start;
-  float distance = max(length(offset), 1.0e-10);
-  towards = offset / distance;
-  float cosine = abs(dot(towards, emitter.normal));
-  flux = emitter.radiance * (cosine / (emitter.density * distance * distance) *
-                             share_of_points(emitter.density, distance, cosine));
-  if (flux != vec3(0.0)) {
-    flux *= light_along(start, towards, distance * 0.9999, 0);
-  }
-#endif
+  vec3 towards;
+  vec3 flux = flux_of_emitters(start, key, number, towards);
   store(entry, 1, towards, 0.0, flux);
-
-  flux = vec3(0.0);
-  int suns = light_count - first_sun;
-  if (suns > 0) {
-    int sun = first_sun + number % suns;
-    LightSample light_sample = sample_light(sun, start, sample_r2(key + uvec3(0u, 2u, 0u), number));
-    towards = light_sample.direction;
-    flux = light_sample.irradiance * float(suns) * light_along(start, towards, NO_HIT, 0);
-  }
+  flux = flux_of_suns(start, key, number, towards);
   store(entry, 2, towards, 0.0, flux);
 
   vec2 u = sample_r2(key, number);
