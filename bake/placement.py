@@ -20,7 +20,8 @@ from ..gpu_shaders.probe_views import exits, sightings
 from .batches import Batches
 
 _WALLS_OF_A_CORNER = 3
-_kept_clear = Kept(clearance.keep_clear, last=1 + _WALLS_OF_A_CORNER)
+_WAYS = 2  # that a probe tries from its node
+_kept_clear = Kept(clearance.keep_clear, last=1 + _WAYS * _WALLS_OF_A_CORNER)
 
 
 @dataclass
@@ -138,14 +139,44 @@ def _relocate(
     placement: Placement, batches: Batches, backend: GpuBackend, grid: Grid, obstacles: Callable[[], Obstacles]
 ) -> Steps[None]:
     """Moves probes that stand in or behind walls, through as many as meet in a corner. One that still does at its last
-    place goes home; one that came out into a dark room stays, or the wall of that room would be left to probes of the
-    lit one next door. Where they came out, and in rooms with normals outwards, they keep clear of surfaces too."""
+    place goes home and tries another way, as a wall's near side may be that of the void; one that came out into a dark
+    room stays, or the wall of that room would be left to probes of the lit one next door. Where they came out, and in
+    rooms with normals outwards, they keep clear of surfaces too."""
     step = placement.step
     leaving = placement.misplaced
     beside = ~placement.misplaced & ~placement.by_hand & (placement.shares[:, 3] > 0)  # others were kept clear before
-    for _ in range(_WALLS_OF_A_CORNER):
+    failed = np.zeros_like(step)
+    for _ in range(_WAYS):
+        first_step = yield from _leave(placement, leaving, beside, failed, batches, backend, grid, obstacles)
+        back = placement.moved & placement.misplaced & placement.misplaced_now()
+        if not back.any():
+            break
+        failed[back] = first_step[back]
+        step[back] = 0.0
+        yield from _stand(placement, np.flatnonzero(back), batches, backend)
+        placement.went_back |= back
+        leaving, beside = back, np.zeros_like(beside)
+    placement.went_back &= ~placement.moved
+
+
+def _leave(
+    placement: Placement,
+    leaving: np.ndarray,
+    beside: np.ndarray,
+    failed: np.ndarray,
+    batches: Batches,
+    backend: GpuBackend,
+    grid: Grid,
+    obstacles: Callable[[], Obstacles],
+) -> Steps[np.ndarray]:
+    """Moves probes ``leaving`` (S,) through one wall after the other, not along ``failed`` (S, 3), and those ``beside``
+    (S,) surfaces off them; returns the moves (S, 3) through the first wall."""
+    step = placement.step
+    first_step = step
+    for wall in range(_WALLS_OF_A_CORNER):
         before = step.copy()
-        yield from _step_out(placement, np.flatnonzero(leaving), batches, backend, grid)
+        yield from _step_out(placement, np.flatnonzero(leaving), failed, batches, backend, grid)
+        first_step = first_step if wall else step.copy()
         settled = beside | (step != before).any(axis=1)
         if settled.any():
             yield from _keep_clear(placement, settled, batches, grid, obstacles)
@@ -155,23 +186,26 @@ def _relocate(
         yield from _stand(placement, np.flatnonzero(changed), batches, backend)
         leaving = changed & placement.misplaced & placement.misplaced_now()
         beside = np.zeros_like(beside)
-    back = placement.moved & placement.misplaced & placement.misplaced_now()
-    if back.any():
-        placement.went_back |= back
-        step[back] = 0.0
-        yield from _stand(placement, np.flatnonzero(back), batches, backend)
+    return first_step
 
 
 def _step_out(
-    placement: Placement, leaving: np.ndarray, batches: Batches, backend: GpuBackend, grid: Grid
+    placement: Placement,
+    leaving: np.ndarray,
+    failed: np.ndarray,
+    batches: Batches,
+    backend: GpuBackend,
+    grid: Grid,
 ) -> Steps[None]:
-    """Moves probes ``leaving`` (L,) through the nearest surface, where one is near enough."""
+    """Moves probes ``leaving`` (L,) through the nearest surface, where one is near enough, not along ``failed`` (S,
+    3)."""
     for index in range(batches.count):
         slots = batches.slots_of(index, leaving)
         if len(slots):
             surfaces = yield from batches.bound(index)
             found = exits(backend, surfaces, slots - surfaces.first)
-            placement.step[slots] += relocation.moves(grid, placement.home[slots], found, placement.step[slots])
+            home, step = placement.home[slots], placement.step[slots]
+            placement.step[slots] += relocation.moves(grid, home, found, step, failed[slots])
         yield
 
 

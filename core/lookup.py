@@ -4,20 +4,24 @@
 Irradiance at a point is the trilinear blend of the eight probes around it, each led to the point by half of its
 gradient: two first-order expansions so blended reproduce the second order as well. Each is weighted by whether it sees
 the point: Chebyshev's inequality on the depth moments of its octahedral map (Donnelly and Lauritzen, I3D 2006; Majercik
-et al., JCGT 2019), asked of inverse distances. A plane's inverse distance is linear in the direction, so what is
-blended between texels lies on the wall, where a mean of distances at a slant lies behind it. There is no weight for the
-surface's orientation: it would bend the interpolation in open space, and a probe behind a wall is already found by its
-depth. Culled probes hang in free air, have no statistics and count as seen. Points outside the box are clamped to it,
-but gradients lead on for half a cell. GLSL twin: lookup_lib.glsl and field_lib.glsl.
+et al., JCGT 2019), asked of inverse distances. A plane's inverse distance is linear in the direction, and texels are
+blended so that their directions come to the one asked for: of a flat wall the map errs nowhere, at whatever slant.
+Points are moved off their surface by a share of the distance to the probe, because a map is as coarse as it is far from
+what it shows. There is no weight for the surface's orientation: it would bend the interpolation in open space, and a
+probe behind a wall is already found by its depth. Culled probes hang in free air, have no statistics and count as seen.
+Points outside the box are clamped to it, but gradients lead on for half a cell. GLSL twin: lookup_lib.glsl and
+field_lib.glsl.
 """
 
 from __future__ import annotations
+
+from functools import cache
 
 import numpy as np
 
 from . import spherical_harmonics as sh
 from .conventions import ACTIVE, DEPTH_EDGE, INVALID
-from .cubemap import octahedral_encode
+from .cubemap import octahedral_decode
 from .field import Field
 from .gradients import per_cell
 from .grid import Grid
@@ -26,7 +30,16 @@ LEAST_WEIGHT = 1e-24  # of an active probe that does not see the point: decides 
 INVALID_WEIGHT = 1e-27  # of probes inside solids, which carry their neighbours' light
 ON_BORDER = 1e-4  # of a cell: what is as near to a border lies on it, or rounding would choose between unseen and seen
 BEYOND = 0.5  # cells past the box that gradients lead on
-_SHARPNESS = 12  # power of the chance
+# Of the distance to the probe: how far points are moved along their normal before they are tested, so that their own
+# surface does not hide them. As far may places in free space look through a wall that they face.
+OFF_SURFACE = 0.09
+# Times as close as the point: what is closer hides it no more. A probe beside a wall has it in the texels next to those
+# that look along it, a hundred times as close as anything there.
+HIDES = 4.0
+# Inverse distance, in those of the depth clamp: what is farther counts as this far. Where all texels are at the clamp,
+# blends of them are up to 1.08, as flat as between points of a wall.
+FARTHEST = 1.1
+_SHARPNESS = 10  # power of the chance
 LEAST_DISTANCE = 1e-6  # of the depth clamp: what a surface at no distance counts as
 _POINTS_AT_ONCE = 1 << 13
 _CORNERS = np.array([[corner & 1, corner >> 1 & 1, corner >> 2] for corner in range(8)])
@@ -35,12 +48,6 @@ _CORNERS = np.array([[corner & 1, corner >> 1 & 1, corner >> 2] for corner in ra
 def depth_clamp(grid: Grid) -> float:
     """Metres beyond which depth statistics do not look: one and a half diagonals of a cell."""
     return 1.5 * float(np.linalg.norm(grid.cell_size()))
-
-
-def visibility_bias(grid: Grid) -> float:
-    """Metres that a point is moved along its normal before it is tested, so that its own surface does not hide it. As
-    far it may look through a wall that it faces, where it is not on a surface."""
-    return 0.08 * float(grid.cell_size().min())
 
 
 def least_deviation(grid: Grid) -> float:
@@ -55,7 +62,7 @@ def grid_info(grid: Grid) -> np.ndarray:
     info[:3, :3] = to_lattice[:, :3]
     info[:3, 3] = to_lattice[:, :3] @ grid.center + to_lattice[:, 3]
     info[3] = (*grid.resolution, depth_clamp(grid))
-    info[4, :2] = visibility_bias(grid), least_deviation(grid)
+    info[4, 0] = least_deviation(grid)
     return info
 
 
@@ -63,9 +70,8 @@ def lookup_weights(field: Field, points: np.ndarray, normals: np.ndarray) -> tup
     """Nodes (N, 8) and weights (N, 8), summing to 1, that make up the field at ``points`` (N, 3) with ``normals`` (N,
     3)."""
     nodes, weights = trilinear(field.grid, points)
-    seen_points = points + normals * visibility_bias(field.grid)
     state = field.state[nodes]
-    seen = np.where(state == ACTIVE, np.maximum(visibility(field, nodes, seen_points), LEAST_WEIGHT), 1.0)
+    seen = np.where(state == ACTIVE, np.maximum(visibility(field, nodes, points, normals), LEAST_WEIGHT), 1.0)
     weights = weights * np.where(state == INVALID, INVALID_WEIGHT, seen)
     return nodes, weights / weights.sum(axis=1, keepdims=True)
 
@@ -102,16 +108,18 @@ def _place(grid: Grid, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.n
     return cell, np.where(np.abs(blend - border) < ON_BORDER, border, blend), lattice - clamped
 
 
-def visibility(field: Field, nodes: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """(N, 8) chance that each of ``nodes`` (N, 8) sees its point of ``points`` (N, 3)."""
-    probes = field.grid.positions()[nodes] + field.offset[nodes]
-    offset = points[:, None] - probes
+def visibility(field: Field, nodes: np.ndarray, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(N, 8) chance that each of ``nodes`` (N, 8) sees its point of ``points`` (N, 3) on a surface with ``normals`` (N,
+    3)."""
+    offset = points[:, None] - (field.grid.positions()[nodes] + field.offset[nodes])
+    offset = offset + OFF_SURFACE * np.linalg.norm(offset, axis=2, keepdims=True) * normals[:, None]
     distance = np.linalg.norm(offset, axis=2)
     away = distance > 0
     direction = np.where(away[..., None], offset, [0, 0, 1]) / np.where(away, distance, 1)[..., None]
     clamp = depth_clamp(field.grid)
-    inverse, variance = np.moveaxis(_sample_inverse(field.depth / [clamp, clamp**2], nodes, direction), -1, 0)
-    inverse_there = np.maximum(clamp / np.where(away, distance, 1), 1.0)
+    inverse_there = np.maximum(clamp / np.where(away, distance, 1), FARTHEST)
+    moments = _sample_inverse(field.depth / [clamp, clamp**2], nodes, direction, HIDES * inverse_there)
+    inverse, variance = np.moveaxis(moments, -1, 0)
     beyond = inverse - inverse_there
     least = least_deviation(field.grid) / clamp * inverse * inverse_there
     variance = np.maximum(variance, least**2)
@@ -143,18 +151,68 @@ def inverse_moments(depth: np.ndarray) -> np.ndarray:
     return np.stack([(1.0 + np.minimum(spread, 1.0)) / mean, spread / mean**2], axis=-1)
 
 
-def _sample_inverse(depth: np.ndarray, nodes: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """(…, 2) bilinear sample of the inverse moments of octahedral ``depth`` (P, DEPTH_EDGE², 2) of ``nodes`` (…) along
-    ``directions`` (…, 3)."""
-    position = (octahedral_encode(directions) * 0.5 + 0.5) * DEPTH_EDGE - 0.5
+def _sample_inverse(depth: np.ndarray, nodes: np.ndarray, directions: np.ndarray, most: np.ndarray) -> np.ndarray:
+    """(…, 2) inverse moments along ``directions`` (…, 3) of octahedral ``depth`` (P, DEPTH_EDGE², 2) of ``nodes`` (…),
+    blended of four texels, of which none counts as closer than ``most`` (…)."""
+    position, scale = _blended_place(directions)
     corner = np.floor(position).astype(int)
-    blend = position - corner
     result = np.zeros((*nodes.shape, 2))
-    for step in np.ndindex(2, 2):
+    for step, weight in _texel_weights(position - corner, corner).items():
         texel = _wrap_octahedral(corner + step)
-        weight = np.where(step, blend, 1 - blend).prod(axis=-1)
-        result = result + weight[..., None] * inverse_moments(depth[nodes, texel[..., 1] * DEPTH_EDGE + texel[..., 0]])
+        number = texel[..., 1] * DEPTH_EDGE + texel[..., 0]
+        inverse, variance = np.moveaxis(inverse_moments(depth[nodes, number]), -1, 0)
+        along = scale * _texel_lengths()[number]
+        share = np.minimum(along, most / inverse)
+        result = result + weight[..., None] * np.stack([inverse * share, variance * share**2], axis=-1)
     return result
+
+
+def _blended_place(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where in the map (…, 2), in texels, four of them are blended to ``directions`` d (…, 3); and what the blend is to
+    be multiplied by (…).
+
+    Texels stand at o = d / |d|₁ on the octahedron, whose faces are flat in the map. Between texels on two sides of its
+    edges x = 0 and y = 0, each half a texel from it, a blend cuts the edge off: what it means lies ``inside`` times as
+    far from the octahedron's middle, and is to be looked up ``inside`` times as far from that of the map.
+    """
+    absolute = np.abs(directions)
+    length = absolute.sum(axis=-1)
+    flat = absolute[..., :2] / length[..., None]
+    half = 1.0 / DEPTH_EDGE
+    one_edge = (1.0 - half) / np.maximum(1.0 - flat.min(axis=-1), 1e-9)
+    two_edges = (1.0 - 2.0 * half) / np.maximum(1.0 - flat.sum(axis=-1), 1e-9)
+    inside = np.minimum(1.0, np.minimum(one_edge, two_edges))
+    sign = np.where(directions[..., :2] < 0, -1.0, 1.0)
+    upper = directions[..., 2:] >= 0
+    place = sign * np.where(upper, inside[..., None] * flat, 1.0 - inside[..., None] * flat[..., ::-1])
+    return (place * 0.5 + 0.5) * DEPTH_EDGE - 0.5, length / inside
+
+
+def _texel_weights(blend: np.ndarray, corner: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
+    """Weights (…) of the four texels from ``corner`` (…, 2) on, by step from it, at ``blend`` (…, 2) between them:
+    bilinear, or linear in each of two triangles where the octahedron's edge z = 0 cuts the four in half."""
+    middle = 2 * (corner + 1) - DEPTH_EDGE
+    turned = middle < 0
+    x, y = np.moveaxis(np.where(turned, 1.0 - blend, blend), -1, 0)  # outwards from the middle of the map
+    past = x + y - 1.0
+    outermost = past > 0
+    beside = np.where(outermost, 1.0 - y, x), np.where(outermost, 1.0 - x, y)
+    triangles = np.stack([np.maximum(-past, 0.0), *beside, np.maximum(past, 0.0)])
+    on_edge = np.abs(middle).sum(axis=-1) == DEPTH_EDGE
+    weights = {}
+    for step in np.ndindex(2, 2):
+        out = turned ^ np.array(step, bool)
+        linear = np.take_along_axis(triangles, (out[..., 0] + 2 * out[..., 1])[None], axis=0)[0]
+        weights[step] = np.where(on_edge, linear, np.where(step, blend, 1.0 - blend).prod(axis=-1))
+    return weights
+
+
+@cache
+def _texel_lengths() -> np.ndarray:
+    """(DEPTH_EDGE²,) |o| of texels' middles on the octahedron, which is one over the |d|₁ of their directions."""
+    middle = (np.arange(DEPTH_EDGE) + 0.5) * (2.0 / DEPTH_EDGE) - 1.0
+    uv = np.stack(np.meshgrid(middle, middle), axis=-1).reshape(-1, 2)
+    return 1.0 / np.abs(octahedral_decode(uv)).sum(axis=-1)
 
 
 def _wrap_octahedral(texel: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ from .orientation import inside_solid
 _LEAST_BEHIND = 0.25  # share of back faces, or of background, in sight of a probe that stands in or behind a wall
 _REACH = 0.5  # cells
 _MARGIN = 0.05  # cells between a moved probe and the surface it came through
+_OPPOSITE = 0.5  # cosine beyond which a way leads to the other side of a wall
 _ALIKE = 1e-3  # relative difference of costs that tells nothing
 _BACK = 0.15  # cosine beyond which a way leads back to where a probe came from
 _OUTWARD_PENALTY = 0.5  # how much farther than inwards the way out of the volume counts
@@ -29,12 +30,13 @@ def misplaced(shares: np.ndarray, light_elsewhere: bool = False) -> np.ndarray:
     return inside_solid(shares, light_elsewhere) | (dark & (np.maximum(shares[:, 1], shares[:, 3]) > _LEAST_BEHIND))
 
 
-def moves(grid: Grid, home: np.ndarray, exits: np.ndarray, moved: np.ndarray) -> np.ndarray:
+def moves(grid: Grid, home: np.ndarray, exits: np.ndarray, moved: np.ndarray, failed: np.ndarray) -> np.ndarray:
     """(L, 3) displacement in metres of probes that came from world ``home`` (L, 3) and ``moved`` (L, 3) so far, 0 where
     no exit is near enough.
 
     ``exits`` (L, 6, 4) holds offset and distance of the nearest surface in each cube face. Ways towards the volume's
-    centre are preferred: what lies outside is rarely meant. None leads back.
+    centre are preferred: what lies outside is rarely meant. None leads back. Where a way ``failed`` (L, 3) before, to
+    the void or to the inside of another solid, the other side of the wall is left.
     """
     offset, distance = exits[..., :3].astype(float), exits[..., 3].astype(float)
     margin = _MARGIN * float(grid.cell_size().min())
@@ -46,10 +48,11 @@ def moves(grid: Grid, home: np.ndarray, exits: np.ndarray, moved: np.ndarray) ->
     in_cells = np.abs((moved[:, None] + step) @ inverse.T) * spans
     near = (in_cells <= _REACH).all(axis=-1)
     back = np.einsum("lfi,li->lf", direction, moved) < -_BACK * np.linalg.norm(moved, axis=1)[:, None]
+    other_side = np.einsum("lfi,li->lf", direction, failed) <= -_OPPOSITE * np.linalg.norm(failed, axis=1)[:, None]
     inward = grid.center - home - moved
     inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), 1e-20)
     cost = length * (1.0 + _OUTWARD_PENALTY * (1.0 - np.einsum("lfi,li->lf", direction, inward)))
-    cost = np.where(near & ~back, cost, np.inf)
+    cost = np.where(near & ~back & other_side, cost, np.inf)
     # Of ways that are alike the first one: rounding must not decide where a probe stands.
     best = (cost <= (1.0 + _ALIKE) * cost.min(axis=1, keepdims=True)).argmax(axis=1)
     row = np.arange(len(home))

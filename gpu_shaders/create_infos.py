@@ -7,16 +7,27 @@ make up which stage, libraries first.
 
 from __future__ import annotations
 
+from ..core import lookup
 from ..core.conventions import DEPTH_EDGE, DEPTH_SPREAD
 from ..core.emitters import CANDIDATES, EMITTER_BOXES
 from ..core.gradients import LEAST_COSINE
 from ..core.images import HALF_MAX
-from ..core.lookup import BEYOND, INVALID_WEIGHT, LEAST_DISTANCE, LEAST_WEIGHT, ON_BORDER
 from ..core.patches import SLOW
 
 NO_SURFACE = "1.0e30"
 # What shaders begin with that sum up a probe's texels.
 _PROBE_FILES = ("data_lib", "octahedral_lib", "cubemap_lib", "spherical_harmonics_lib", "group_sum_lib")
+
+_LOOKUP_CONSTANTS = (
+    "BEYOND",
+    "FARTHEST",
+    "HIDES",
+    "INVALID_WEIGHT",
+    "LEAST_DISTANCE",
+    "LEAST_WEIGHT",
+    "OFF_SURFACE",
+    "ON_BORDER",
+)
 
 
 def _samplers(info, *names: str, kind: str = "FLOAT_2D", first: int = 0) -> int:
@@ -62,11 +73,8 @@ def _sheet_files(defines: dict) -> list[str]:
 
 def _lookup(info, first: int) -> int:
     info.define("DEPTH_EDGE", str(DEPTH_EDGE))
-    info.define("LEAST_WEIGHT", repr(LEAST_WEIGHT))
-    info.define("ON_BORDER", repr(ON_BORDER))
-    info.define("LEAST_DISTANCE", repr(LEAST_DISTANCE))
-    info.define("INVALID_WEIGHT", repr(INVALID_WEIGHT))
-    info.define("BEYOND", repr(BEYOND))
+    for name in _LOOKUP_CONSTANTS:
+        info.define(name, repr(getattr(lookup, name)))
     info.uniform_buf(0, "vec4", "grid_info[5]")
     return _samplers(info, "grid_nodes", "depth_moments", first=first)
 

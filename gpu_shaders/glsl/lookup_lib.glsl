@@ -4,7 +4,7 @@
  * Shadow Maps", I3D 2006; in probe grids: Majercik et al., "Dynamic Diffuse Global Illumination with Ray-Traced
  * Irradiance Fields", JCGT 2019.
  *
- * grid_info: rows of world-to-lattice (0..2); resolution, depth clamp (3); visibility bias, least deviation (4)
+ * grid_info: rows of world-to-lattice (0..2); resolution, depth clamp (3); least deviation (4)
  * grid_nodes, 1 element a node: capture position, slot of an active probe, −1 culled, −2 invalid
  * depth_moments: DEPTH_EDGE² elements a slot, (mean, mean square) of clamped distance
  */
@@ -26,48 +26,83 @@ ivec2 wrap_octahedral(ivec2 texel)
   return texel;
 }
 
-/* Mean and variance of the inverse distance, in those of the depth clamp: planes are linear in it. */
-vec2 fetch_inverse(int slot, ivec2 texel)
+/* Mean and variance of the inverse distance, in those of the depth clamp, times the length that the texel's direction
+ * has on the octahedron and `scale`; no closer than `most`. */
+vec2 fetch_inverse(int slot, ivec2 texel, float scale, float most)
 {
   texel = wrap_octahedral(texel);
   vec2 depth = element(depth_moments, (slot * DEPTH_EDGE + texel.y) * DEPTH_EDGE + texel.x).xy;
   float inverse = 1.0 / max(depth.x / grid_info[3].w, LEAST_DISTANCE);
   float scaled = inverse / grid_info[3].w;
   float spread = max(depth.y * scaled * scaled - 1.0, 0.0);
-  return vec2(inverse * (1.0 + min(spread, 1.0)), inverse * inverse * spread);
+  float mean = inverse * (1.0 + min(spread, 1.0));
+  vec2 place = abs((vec2(texel) + 0.5) * (2.0 / float(DEPTH_EDGE)) - 1.0);
+  float height = 1.0 - place.x - place.y;
+  place = height < 0.0 ? 1.0 - place : place;
+  float share = min(scale * length(vec3(place, height)), most / mean);
+  return vec2(mean * share, inverse * inverse * spread * share * share);
 }
 
-vec2 sample_inverse(int slot, vec3 direction)
+/* Weights of the texels from a corner on (x fastest) at `blend` between them: bilinear, or linear in each of two
+ * triangles where the octahedron's edge z = 0 cuts the four in half. `middle`: of the four, in half texels from the
+ * middle of the map. */
+vec4 texel_weights(vec2 blend, ivec2 middle)
 {
-  vec2 position = (octahedral_encode(direction) * 0.5 + 0.5) * float(DEPTH_EDGE) - 0.5;
-  ivec2 corner = ivec2(floor(position));
-  vec2 blend = position - vec2(corner);
-  return mix(mix(fetch_inverse(slot, corner), fetch_inverse(slot, corner + ivec2(1, 0)), blend.x),
-             mix(fetch_inverse(slot, corner + ivec2(0, 1)), fetch_inverse(slot, corner + ivec2(1, 1)), blend.x),
-             blend.y);
+  vec2 rest = 1.0 - blend;
+  if (abs(middle.x) + abs(middle.y) != DEPTH_EDGE) {
+    return vec4(rest.x * rest.y, blend.x * rest.y, rest.x * blend.y, blend.x * blend.y);
+  }
+  bvec2 turned = lessThan(middle, ivec2(0));
+  vec2 outward = mix(blend, rest, turned);
+  float past = outward.x + outward.y - 1.0;
+  vec4 weights = past > 0.0 ? vec4(0.0, 1.0 - outward.y, 1.0 - outward.x, past) :
+                              vec4(-past, outward.x, outward.y, 0.0);
+  weights = turned.x ? weights.yxwz : weights;
+  return turned.y ? weights.zwxy : weights;
 }
 
-/* How likely the probe in `slot` sees `point`, 0..1. */
-float visibility(int slot, vec3 probe, vec3 point)
+/* Blended of four texels so that their directions come to `direction`: planes are linear in it. See core/lookup.py. */
+vec2 sample_inverse(int slot, vec3 direction, float most)
+{
+  float norm = dot(abs(direction), vec3(1.0)), halved = 1.0 / float(DEPTH_EDGE);
+  vec2 flat_place = abs(direction.xy) / norm;
+  float one_edge = (1.0 - halved) / max(1.0 - min(flat_place.x, flat_place.y), 1e-9);
+  float two_edges = (1.0 - 2.0 * halved) / max(1.0 - flat_place.x - flat_place.y, 1e-9);
+  float inside = min(1.0, min(one_edge, two_edges));
+  vec2 place = inside * flat_place;
+  place = direction.z < 0.0 ? 1.0 - place.yx : place;
+  place *= mix(vec2(1.0), vec2(-1.0), lessThan(direction.xy, vec2(0.0)));
+  vec2 position = (place * 0.5 + 0.5) * float(DEPTH_EDGE) - 0.5;
+  ivec2 corner = ivec2(floor(position));
+  vec4 weights = texel_weights(position - vec2(corner), 2 * (corner + 1) - DEPTH_EDGE);
+  float scale = norm / inside;
+  return weights.x * fetch_inverse(slot, corner, scale, most) +
+         weights.y * fetch_inverse(slot, corner + ivec2(1, 0), scale, most) +
+         weights.z * fetch_inverse(slot, corner + ivec2(0, 1), scale, most) +
+         weights.w * fetch_inverse(slot, corner + ivec2(1, 1), scale, most);
+}
+
+/* How likely the probe in `slot` sees `point` on a surface with `normal`, 0..1. */
+float visibility(int slot, vec3 probe, vec3 point, vec3 normal)
 {
   vec3 offset = point - probe;
+  offset += OFF_SURFACE * length(offset) * normal;
   float squared = dot(offset, offset);
   if (squared == 0.0) {
     return 1.0;
   }
   float distance = sqrt(squared);
-  vec2 inverse = sample_inverse(slot, offset / distance);
-  float inverse_there = max(grid_info[3].w / distance, 1.0);
+  float inverse_there = max(grid_info[3].w / distance, FARTHEST);
+  vec2 inverse = sample_inverse(slot, offset / distance, HIDES * inverse_there);
   float beyond = inverse.x - inverse_there;
   if (beyond <= 0.0) {
     return 1.0;
   }
-  float least = grid_info[4].y / grid_info[3].w * inverse.x * inverse_there;
+  float least = grid_info[4].x / grid_info[3].w * inverse.x * inverse_there;
   float variance = max(inverse.y, least * least);
   float chance = variance / (variance + beyond * beyond);
-  chance *= chance;
-  chance *= chance;
-  return chance * chance * chance; /* of what is now the fourth power: the twelfth */
+  float fourth = chance * chance * chance * chance;
+  return fourth * fourth * chance * chance; /* the tenth power */
 }
 
 /* `point` in node numbers, clamped to the box; `beyond`: cells past it. */
@@ -97,7 +132,6 @@ ivec3 lookup_cell(vec3 point, vec3 normal, out float weights[8], out vec4 lead)
   vec3 border = floor(blend + 0.5);
   blend = mix(blend, border, lessThan(abs(blend - border), vec3(ON_BORDER)));
   lead = vec4(0.5 * blend + clamp(beyond, -BEYOND, BEYOND), 0.0);
-  vec3 seen_point = point + normal * grid_info[4].x;
   float plain[8];
   float sum = 0.0;
   for (int corner = 0; corner < 8; corner++) {
@@ -108,7 +142,7 @@ ivec3 lookup_cell(vec3 point, vec3 normal, out float weights[8], out vec4 lead)
     if (weight > 0.0) {
       vec4 node = element(grid_nodes, node_index(cell + step));
       if (node.w >= 0.0) {
-        weight *= max(visibility(int(node.w), node.xyz, seen_point), LEAST_WEIGHT);
+        weight *= max(visibility(int(node.w), node.xyz, point, normal), LEAST_WEIGHT);
       }
       else if (node.w < -1.0) {
         weight *= INVALID_WEIGHT;

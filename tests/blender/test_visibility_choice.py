@@ -24,18 +24,14 @@ POINTS, SAMPLES, HEIGHT = 24, 16, 32
 SLACK = 1.08  # times the error of the best other choice that leaks as little: so well these points tell them apart
 
 
-def moved_by(share):
-    return lambda grid: share * float(grid.cell_size().min())
-
-
 CHOICES = {
     "as it is": {},
-    "no visibility": {"visibility": lambda field, nodes, points: np.ones(nodes.shape)},
-    "8th power": {"_SHARPNESS": 8},
+    "no visibility": {"visibility": lambda field, nodes, points, normals: np.ones(nodes.shape)},
+    "6th power": {"_SHARPNESS": 6},
     "32nd power": {"_SHARPNESS": 32},
-    "not moved": {"visibility_bias": moved_by(0.0)},
-    "moved by 0.04 of a cell": {"visibility_bias": moved_by(0.04)},
-    "moved by 0.12 of a cell": {"visibility_bias": moved_by(0.12)},
+    "not moved": {"OFF_SURFACE": 0.0},
+    "moved by 0.05 of the distance": {"OFF_SURFACE": 0.05},
+    "moved by 0.15 of the distance": {"OFF_SURFACE": 0.15},
 }
 
 

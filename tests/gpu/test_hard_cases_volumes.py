@@ -188,3 +188,15 @@ def test_culled_probes_are_filled_from_the_others():
     assert result.counts["culled"] > 9
     culled = result.field.state != ACTIVE
     assert (result.field.coefficients[culled, 0] > 0.5).all()
+
+
+def test_probes_near_the_outside_of_a_wall_come_into_the_rooms_behind_it():
+    """A lit and a dark room; nodes in their common wall, 2 cm from the void, which is the nearer way out."""
+    partition = box((-0.1, -1.5, -1.25), (0.0, 1.5, 1.25))
+    volume = Grid.from_bounds((-1.2, -0.5, -0.6), (1.2, 1.68, 0.6), (2, 2, 2))
+    field = bake_room(volume, extra=[partition]).field
+    in_wall = volume.positions()[:, 1] > 1.5
+    assert (field.state == ACTIVE).all()
+    assert ((volume.positions() + field.offset)[in_wall, 1] < 1.5).all()
+    lit = volume.positions()[:, 0] > 0
+    assert (field.coefficients[lit, 0] > 0).all() and not field.coefficients[~lit].any()

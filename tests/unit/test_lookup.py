@@ -150,15 +150,35 @@ def test_culled_probes_count_as_seen():
 
 
 def test_the_depth_map_has_no_seams():
-    """A smooth distance over the sphere, sampled across the folds of the map, stays smooth."""
+    """A smooth distance over the sphere, sampled across the folds of the map, stays smooth, and comes closer by no more
+    than chords between texels do."""
     field = open_field((1, 1, 1))
     field.depth[0] = depth_of(lambda d: 2 + d @ [0.3, 0.5, -0.4])
     angle = np.linspace(0, 2 * np.pi, 4000)
     for axis in range(3):
         circle = np.roll(np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1), axis, axis=1)
-        sampled = 1 / lookup._sample_inverse(field.depth, np.zeros(len(circle), int), circle)[:, 0]
+        sampled = 1 / inverse_along(field, circle)
         assert np.abs(np.diff(sampled)).max() < 0.01
-        assert np.abs(sampled - (2 + circle @ [0.3, 0.5, -0.4])).max() < 0.12
+        share = sampled / (2 + circle @ [0.3, 0.5, -0.4])
+        assert 0.92 < share.min() and share.max() < 1.02
+
+
+def inverse_along(field, directions):
+    """(N,) inverse of the distance that probe 0 knows of along ``directions`` (N, 3)."""
+    nodes, unlimited = np.zeros(len(directions), int), np.full(len(directions), np.inf)
+    return lookup._sample_inverse(field.depth, nodes, directions, unlimited)[:, 0]
+
+
+@pytest.mark.parametrize("normal", [[1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1], [3, 4, 0], [1, -1, 1], [-2, 5, -4]])
+def test_the_depth_map_knows_flat_walls_exactly(normal):
+    """A wall in any direction and at any slant, across all folds of the map."""
+    normal = np.array(normal) / np.linalg.norm(normal)
+    field = open_field((1, 1, 1))
+    field.depth[0] = depth_of(lambda d: 1.5 / np.maximum(d @ normal, 1e-4))
+    directions = np.random.default_rng(5).normal(size=(5000, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    directions = directions[directions @ normal > 0.75]  # of which all four texels see the wall
+    np.testing.assert_allclose(inverse_along(field, directions), directions @ normal / 1.5, rtol=1e-5)
 
 
 def blurred_depth_of(distance_along, clamp):
@@ -186,7 +206,8 @@ def test_a_wall_seen_at_a_slant_hides_what_is_behind_it(apart):
     along = random.uniform(0, 1, (2000, 2))
     behind = probe + np.column_stack([np.full(2000, apart + 0.1 + 0.02), along])
     nodes = np.zeros((2000, 1), int)
-    assert lookup.visibility(field, nodes, behind).mean() < 0.1
+    anywhere = np.zeros((2000, 3))  # no surface to be moved off
+    assert lookup.visibility(field, nodes, behind, anywhere).mean() < 0.1
     before = probe + np.column_stack([np.full(2000, 0.5 * apart), along])
     # A probe at 5 cm cannot tell what is half way to the wall and far along it: others take its part.
-    assert lookup.visibility(field, nodes, before).mean() > (0.15 if apart < 0.1 else 0.9)
+    assert lookup.visibility(field, nodes, before, anywhere).mean() > (0.15 if apart < 0.1 else 0.9)

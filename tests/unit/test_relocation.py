@@ -19,19 +19,28 @@ def exits_of(*distances):
 
 
 def test_the_way_towards_the_middle_is_taken_where_another_is_as_short():
-    found = moves(GRID, HOME, exits_of(NOWHERE, NOWHERE, 0.2, 0.2, NOWHERE, NOWHERE), STILL)
+    found = moves(GRID, HOME, exits_of(NOWHERE, NOWHERE, 0.2, 0.2, NOWHERE, NOWHERE), STILL, STILL)
     np.testing.assert_allclose(found, [[0, 0.25, 0]])
 
 
 def test_from_a_corner_three_ways_lead_inwards():
     """Behind each wall is the next; the nearest surface is the one that the probe came through."""
-    moved = moves(GRID, HOME, exits_of(0.2, 0.2, 0.21, 0.2, 0.22, 0.2), STILL)
-    moved = moved + moves(GRID, HOME, exits_of(NOWHERE, 0.05, 0.21, 0.2, 0.22, 0.2), moved)
-    moved = moved + moves(GRID, HOME, exits_of(NOWHERE, NOWHERE, NOWHERE, 0.05, 0.22, 0.2), moved)
+    moved = moves(GRID, HOME, exits_of(0.2, 0.2, 0.21, 0.2, 0.22, 0.2), STILL, STILL)
+    moved = moved + moves(GRID, HOME, exits_of(NOWHERE, 0.05, 0.21, 0.2, 0.22, 0.2), moved, STILL)
+    moved = moved + moves(GRID, HOME, exits_of(NOWHERE, NOWHERE, NOWHERE, 0.05, 0.22, 0.2), moved, STILL)
     np.testing.assert_allclose(moved, [[0.25, 0.26, 0.27]])
 
 
 def test_half_a_cell_is_the_farthest_in_all():
-    assert not moves(GRID, HOME, exits_of(0.46, NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE), STILL).any()
+    assert not moves(GRID, HOME, exits_of(0.46, NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE), STILL, STILL).any()
     before = np.array([[0.3, 0.0, 0.0]])
-    assert not moves(GRID, HOME, exits_of(0.2, NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE), before).any()
+    assert not moves(GRID, HOME, exits_of(0.2, NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE), before, STILL).any()
+
+
+def test_a_way_that_led_nowhere_is_not_tried_again():
+    """Out of the near side of a wall lies the void, out of the far one the room."""
+    out = exits_of(0.1, 0.2, NOWHERE, NOWHERE, NOWHERE, NOWHERE)
+    first = moves(GRID, HOME, out, STILL, STILL)
+    np.testing.assert_allclose(first, [[0.15, 0, 0]])
+    np.testing.assert_allclose(moves(GRID, HOME, out, STILL, first), [[-0.25, 0, 0]])
+    assert not moves(GRID, HOME, exits_of(0.1, *[NOWHERE] * 5), STILL, first).any()
