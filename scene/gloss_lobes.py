@@ -11,10 +11,11 @@ from ..core.conventions import LUMINANCE
 from ..core.gloss import Gloss
 from .shader_values import Value, add, constant
 
-# Of the light, times 1 − roughness, times the root of its share of all that is sent back. Below, a lobe is sent in all
-# directions like the rest: the gloss of a Principled BSDF as Blender adds it, unless it is nearly black, is not worth a
-# bake of four times the work for 1 % of light (docs/measurements.md, Gloss and mirrors).
-LEAST_GLOSS = 0.02
+# Of the light, times (1 − roughness)⁵, times the root of its share of all that is sent back. Below, a lobe is sent in
+# all directions and shows lamps (core/highlights.py); what it would show of lit surfaces is not worth a bake of four to
+# twelve times the work. Plastic of roughness 0.3, metal of 0.6 and all that is duller come as near to Cycles so
+# (docs/measurements.md, Gloss and mirrors).
+LEAST_GLOSS = 0.012
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Mirrored:
     def is_faint(self, sent_back: Value) -> bool:
         """Whether of all that is ``sent_back`` it makes too little of a difference to be followed."""
         light, all_ = self.color.number(), max(sent_back.number(), 1e-9)
-        return light * (1 - self.roughness) * (light / all_) ** 0.5 < LEAST_GLOSS
+        return light * (1 - self.roughness) ** 5 * (light / all_) ** 0.5 < LEAST_GLOSS
 
     def gloss(self, sent_back: Value) -> Gloss | None:
         """It as a part of all that is ``sent_back``; None where nothing is mirrored."""

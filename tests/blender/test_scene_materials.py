@@ -62,7 +62,8 @@ def test_metal_of_an_image_mirrors_it(scene):
     ("inputs", "share", "facing", "roughness"),
     [
         ({}, None, None, None),  # a Principled BSDF as Blender adds it
-        ({"Base Color": (0.03, 0.03, 0.03, 1)}, 0.058, 0.04, 0.5),
+        ({"Base Color": (0.03, 0.03, 0.03, 1)}, None, None, None),  # shows lamps, and nothing else that matters
+        ({"Base Color": (0.03, 0.03, 0.03, 1), "Roughness": 0.2}, 0.083, 0.04, 0.2),
         ({"Coat Weight": 1.0, "Coat Roughness": 0.05, "Specular IOR Level": 0.0}, 0.088, 0.04, 0.05),
     ],
 )
