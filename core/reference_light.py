@@ -240,9 +240,8 @@ class ReferenceLight:
         first_key: int = 0,
         sheets: np.ndarray | None = None,
     ) -> PatchRays:
-        """``rays_each`` rays of each of the patches ``numbers`` (C,). With ``segments`` above 1 they go on as paths,
-        and direct light is sampled where they bounce. Of patches on one of ``sheets`` (N,) every second ray leaves from
-        the back."""
+        """``rays_each`` rays of each of the patches ``numbers`` (C,), with ``segments`` above 1 paths, lit where they
+        bounce. Of patches on one of ``sheets`` (N,) every second ray leaves from the back."""
         patch, index = np.repeat(numbers, rays_each), np.tile(np.arange(rays_each), len(numbers))
         at = points[patch, index * points.shape[1] // rays_each % points.shape[1]]
         point, normal = split(at)
@@ -282,33 +281,37 @@ class ReferenceLight:
             both_sides = self.scene.sheet_shares[sheet].any(axis=1)
             hits[alive, :3] = off_surface(position, direction, np.where(missed, 0.0, surface.distance), both_sides)
             hits[alive, 3] = pack(surface.normal, ~missed)
-            if segment < segments - 1:
-                on = reflected[alive].any(axis=1)
-                alive, facing = alive[on], surface.normal[on]
-                here = shifted(keys[alive], 0, _PATH_LIGHT_STREAM + segment, 0)
-                arriving, coupling[alive] = np.zeros((len(alive), 3)), self.scene.couplings(position[on], facing)
-                for side, normals, side_keys, share in self._sides(facing, here, np.arange(len(alive)), sheet[on]):
-                    towards = np.where((normals * facing[side]).sum(axis=1, keepdims=True) > 0, -1, 1)
-                    start = step_off(
-                        position[on][side], normals, towards * direction[on][side], surface.distance[on][side]
-                    )
-                    how = (values[alive][side] for values in (index, role, coupling))
-                    arriving[side] += share * self._irradiance(
-                        position[on][side], start, normals, side_keys, side_keys, *how
-                    )
-                carried[alive] += reflected[alive] * arriving / np.pi
-                through = self.scene.sheet_shares[sheet[on]]
-                side = pcg3d(shifted(keys[alive], 0, _SIDE_STREAM + segment, 0) + _number(index[alive]))[:, 0]
-                crosses = through.any(axis=1) & (side % 2 == 1)
-                reflected[alive] *= side_weight(through, crosses)
-                turn = np.where(crosses, -1.0, 1.0)[:, None]
-                normal[alive] = turn * facing
-                origin[alive] = step_off(position[on], normal[alive], -turn * direction[on], surface.distance[on])
+            if segment == segments - 1:
+                break
+            on = reflected[alive].any(axis=1)
+            alive, facing, sheet = alive[on], surface.normal[on], sheet[on]
+            met = position[on], facing, direction[on], surface.distance[on]
+            coupling[alive] = self.scene.couplings(position[on], facing)
+            here = shifted(keys[alive], 0, _PATH_LIGHT_STREAM + segment, 0)
+            arriving = self._at_bounces(*met, sheet, here, index[alive], role[alive], coupling[alive])
+            carried[alive] += reflected[alive] * arriving / np.pi
+            through = self.scene.sheet_shares[sheet]
+            side = pcg3d(shifted(keys[alive], 0, _SIDE_STREAM + segment, 0) + _number(index[alive]))[:, 0]
+            crosses = through.any(axis=1) & (side % 2 == 1)
+            reflected[alive] *= side_weight(through, crosses)
+            turn = np.where(crosses, -1.0, 1.0)[:, None]
+            normal[alive] = turn * facing
+            origin[alive] = step_off(position[on], normal[alive], -turn * direction[on], surface.distance[on])
         hits[~reflected.any(axis=1)] = (0.0, 0.0, 0.0, -1.0)
         shape = (len(numbers), rays_each)
         return PatchRays(
             hits.reshape(*shape, 4), carried.reshape(*shape, 3), reflected.reshape(*shape, 3), end_sheets.reshape(shape)
         )
+
+    def _at_bounces(self, position, facing, direction, distance, sheet, keys, index, role, coupling) -> np.ndarray:
+        """(C, 3) direct irradiance where rays have met surface, (C, …) each, from both sides of sheets."""
+        arriving = np.zeros((len(position), 3))
+        for side, normals, side_keys, share in self._sides(facing, keys, np.arange(len(position)), sheet):
+            towards = np.where((normals * facing[side]).sum(axis=1, keepdims=True) > 0, -1, 1)
+            start = step_off(position[side], normals, towards * direction[side], distance[side])
+            how = index[side], role[side], coupling[side]
+            arriving[side] += share * self._irradiance(position[side], start, normals, side_keys, side_keys, *how)
+        return arriving
 
     def connect(self) -> None:
         """Traces rays between patches until they find no surface that is no patch yet."""

@@ -32,8 +32,8 @@ _SIX_SIDES = np.concatenate([np.eye(3), -np.eye(3)])
 
 @dataclass
 class VolumeReport:
-    """One baked volume. ``energy`` and ``change`` hold a value per iteration: the field's energy and its relative
-    change."""
+    """One baked volume. ``energy`` and ``change`` hold a value per iteration: mean luminance of the irradiance of
+    surfaces that probes see, and its relative change."""
 
     field: Field
     name: str = ""
@@ -234,8 +234,8 @@ def _settling(volume: VolumeReport, settings: dict) -> str:
             f"{figures.curve(volume.change, 'Change per iteration', True, tolerance, label, first)}</div>"
         )
     return (
-        f'<p>{text}</p><div class="pair"><div class="box"><h3>Energy of the field</h3>'
-        f"{figures.curve(volume.energy, 'Energy per iteration')}</div>{change}</div>{_list(volume.notes)}"
+        f'<p>{text}</p><div class="pair"><div class="box"><h3>Light on surfaces</h3>'
+        f"{figures.curve(volume.energy, 'Light on surfaces per iteration')}</div>{change}</div>{_list(volume.notes)}"
     )
 
 
