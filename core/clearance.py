@@ -73,7 +73,7 @@ def _large_objects(grid: Grid, vertices: np.ndarray, vertices_of: np.ndarray, ob
     return found if large[object_index].all() else found._chosen(large[object_index])
 
 
-_kept_obstacles = Kept(_large_objects)
+_kept_obstacles = Kept(_large_objects, most_bytes=1 << 30)  # asked for several times in every bake
 
 
 def _in_lattice(grid: Grid, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

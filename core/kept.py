@@ -21,15 +21,19 @@ Result = TypeVar("Result")
 
 _WEIGHTS = np.random.default_rng(0x5DEECE66D).integers(0, 1 << 64, 4096, np.uint64) | np.uint64(1)
 _ROW_BYTES = _WEIGHTS.nbytes
-_MOST_BYTES = 1 << 29  # of arrays that a result was made of; more is made anew, not held
+MOST_BYTES = 1 << 27  # of arrays that a result was made of; more is made anew, not held
 
 
 class Kept(Generic[Result]):
     """The last results of one function that changes nothing it is given, and whose results nobody changes."""
 
-    def __init__(self, make: Callable[..., Result], last: int = 2):
-        """``last``: so many results, two as a bake reads the scene as renders show it and as the viewport does."""
-        self._make, self._last = make, last
+    def __init__(self, make: Callable[..., Result], last: int = 2, most_bytes: int = MOST_BYTES):
+        """
+        Args:
+            last: so many results, two as a bake reads the scene as renders show it and as the viewport does.
+            most_bytes: of arrays that a result was made of.
+        """
+        self._make, self._last, self._most_bytes = make, last, most_bytes
         update_wrapper(self, make)
         self._kept: list[tuple[tuple, Result]] = []  # newest first; replaced, never changed: threads may ask too
 
@@ -40,7 +44,7 @@ class Kept(Generic[Result]):
             if same(before, inputs):
                 return result
         result = self._make(*inputs)
-        if _bytes(inputs) <= _MOST_BYTES:
+        if _bytes(inputs) <= self._most_bytes:
             self._kept = [(inputs, result), *kept[: self._last - 1]]
         return result
 

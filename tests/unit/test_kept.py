@@ -74,10 +74,9 @@ def test_results_are_made_once_for_equal_inputs_and_the_last_two_are_kept():
     assert double.calls == 6
 
 
-def test_large_things_are_not_held(monkeypatch):
-    monkeypatch.setattr("gridlight.core.kept._MOST_BYTES", ARRAY.nbytes - 1)
+def test_large_things_are_not_held():
     make = Counting(lambda array: array + 1)
-    kept = Kept(make)
+    kept = Kept(make, most_bytes=ARRAY.nbytes - 1)
     assert kept(ARRAY) is not kept(ARRAY)
     assert make.calls == 2
 
