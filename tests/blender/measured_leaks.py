@@ -45,10 +45,30 @@ class Leak:
         return max(self.free, self.wall, self.floor)
 
 
-def bake(inset: float, resolution: tuple[int, int, int]) -> Field:
-    """The two rooms in one volume, ``inset`` metres from their outer walls; default settings."""
+def inset_by(inset: float, resolution: tuple[int, int, int]) -> Grid:
+    """A volume over both rooms, ``inset`` metres from their outer walls."""
     far = 2 * ROOM_M + WALL_M
-    grid = Grid.from_bounds((inset,) * 3, (far - inset, ROOM_M - inset, ROOM_M - inset), resolution)
+    return Grid.from_bounds((inset,) * 3, (far - inset, ROOM_M - inset, ROOM_M - inset), resolution)
+
+
+def at_random(count: int) -> list[Grid]:
+    """Volumes that nobody chose: 40 cm inset to 15 cm into the walls, 2,2,2 to 7,4,4 nodes, every second one turned
+    about z by 5 to 85° and so large that it holds the same, and much that is outside."""
+    random = np.random.default_rng(1)
+    grids = []
+    for number in range(count):
+        x, y, z = (int(random.integers(2, most + 1)) for most in (7, 4, 4))
+        grid = inset_by(random.uniform(-0.15, 0.4), (x, y, z))
+        angle = np.radians(random.uniform(5, 85)) * (number % 2)
+        turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+        matrix = grid.matrix.copy()
+        matrix[:3, :3] = turn * (np.abs(turn.T) @ np.diag(grid.matrix)[:3])
+        grids.append(Grid(matrix, grid.resolution, grid.name))
+    return grids
+
+
+def bake(grid: Grid) -> Field:
+    """The two rooms in one volume; default settings."""
     snapshot = read_scene(measured_rooms.two_rooms()[0])
     return run_bake(BakeJob(snapshot, grid, BakeSettings()), Reporter(quiet=True), lambda: False).field
 

@@ -48,7 +48,7 @@ def test_no_other_choice_errs_less_and_leaks_as_little(gpu_context, monkeypatch)
                     errors[name][row.points.name].append(error_of(field, row))
     leaks = {name: [] for name in CHOICES}
     for _where, inset, resolution in measured_leaks.VOLUMES:
-        field = measured_leaks.bake(inset, resolution)
+        field = measured_leaks.bake(measured_leaks.inset_by(inset, resolution))
         for name, choice in CHOICES.items():
             with monkeypatch.context() as patch:
                 for attribute, value in choice.items():
