@@ -25,6 +25,7 @@ from .notices import Notices
 from .placed_mesh import PlacedMesh, joined_surface
 from .surface_parts import AtlasUVs, SurfaceParts
 from .surface_values import ATLAS, Wants, wants
+from .temporary import at_frame
 from .volumes import find_volumes
 from .world import read_world
 
@@ -85,15 +86,8 @@ def read_scene(
         RuntimeError: Blender is rendering and cannot evaluate the scene at render quality now.
     """
     view_layer = view_layer or scene.view_layers[0]
-    own_frame, own_subframe = scene.frame_current, scene.frame_subframe
-    moved = frame is not None and frame != own_frame
-    if moved:
-        scene.frame_set(frame)
-    try:
+    with at_frame(scene, frame):
         return run(_read(scene, view_layer, as_in_viewport if live else at_render_quality, Pace(None)))
-    finally:
-        if moved:
-            scene.frame_set(own_frame, subframe=own_subframe)
 
 
 def read_in_steps(

@@ -48,15 +48,31 @@ def leave_nothing_behind() -> Iterator[None]:
 
 
 @contextmanager
+def at_frame(scene: bpy.types.Scene, frame: int | None) -> Iterator[None]:
+    """``scene`` at ``frame`` (None: where it is), and back at its own frame afterwards.
+
+    The scene itself, as a copy is not enough: animated visibility of what collections instance follows the frame that
+    was set last in the scene of a window.
+    """
+    own_frame, own_subframe = scene.frame_current, scene.frame_subframe
+    moved = frame is not None and frame != own_frame
+    if moved:
+        scene.frame_set(frame)
+    try:
+        yield
+    finally:
+        if moved:
+            scene.frame_set(own_frame, subframe=own_subframe)
+
+
+@contextmanager
 def scene_copy(scene: bpy.types.Scene, frame: int | None = None) -> Iterator[bpy.types.Scene]:
     """A copy of ``scene`` at ``frame`` (default: its current one) with a camera of its own and no post-processing.
 
     Objects, collections and the world are the user's own datablocks: do not write to them.
     """
-    with leave_nothing_behind():
+    with at_frame(scene, frame), leave_nothing_behind():
         copy = scene.copy()
-        if frame is not None:
-            copy.frame_set(frame)
         plain_render_settings(copy)
         copy.camera = new_camera(copy)
         try:

@@ -187,3 +187,18 @@ def test_lights_are_not_seen_but_what_they_light_is(scene):
     assert render_panoramas(scene, np.zeros((1, 3)), 16, 8, 16).max() == 0
     u, v = panorama_coordinates(np.array([0, 0, 1.0]))
     assert (u, v) == (0.5, 1.0)
+
+
+def test_renders_know_what_collections_hide_at_another_frame(scene):
+    """A glowing sheet over the place, an instance of a collection, which is hidden from frame 10 on."""
+    library = bpy.data.collections.new("library")
+    sheet = place(quad(), collection=library, location=(0, 0, 1), scale=(9, 9, 1))
+    sheet.data.materials.append(material("glow", "ShaderNodeEmission", {"Strength": 2.0}))
+    for frame, hidden in ((1, False), (10, True)):
+        sheet.hide_render = hidden
+        sheet.keyframe_insert("hide_render", frame=frame)
+    place(None, instance_type="COLLECTION", instance_collection=library)
+    background(scene, strength=0.0)
+    scene.frame_set(1)
+    seen, gone = (render_panoramas(scene, np.zeros((1, 3)), 16, 8, 1, frame=frame)[0] for frame in (1, 10))
+    assert seen[-1].min() > 0.5 and gone.max() == 0 and scene.frame_current == 1
