@@ -11,6 +11,9 @@ in place of what the lobe sends (core/gloss.py); both are F(θ) over all views, 
 that of a patch, its shadows with it, part by part: each lamp, and all sampled emitters. So nothing but texels has to
 look, and they need no ray.
 
+A look counts by what would arrive if nothing stood between; one that sees much less of a lamp than the patch as a whole
+shows less of it, or a single look at the far end of a tube beside a wall would make a blaze of all its light.
+
 Readable twin of gpu_shaders/glsl/highlight_lib.glsl and highlight_project_comp.glsl. N places.
 """
 
@@ -25,6 +28,7 @@ LAMP_LOOKS, EMITTER_LOOKS = 2, 4  # of a texel, at each part of the light
 # Least width of lobes, against how far facets that mirror one way turn from one side of a texel to the other: probes
 # see all texels together, so a lobe may be as wide as one.
 HIGHLIGHT_BLUR = 1.0
+LEAST_SEEN = 0.25  # of what a patch as a whole gets of a lamp: looks that see less of it show less of it
 HIGHLIGHT_STREAM = 0x5851F42D
 
 

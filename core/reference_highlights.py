@@ -14,10 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from . import direct_light
+from .conventions import LUMINANCE
 from .cubemap import texel_directions
 from .faint_gloss import albedo_towards, coupled, couplings, faint_rows
 from .gloss import PATCH_BLUR, GlossyPlaces
-from .highlights import EMITTER_LOOKS, HIGHLIGHT_BLUR, HIGHLIGHT_STREAM, LAMP_LOOKS, highlights
+from .highlights import EMITTER_LOOKS, HIGHLIGHT_BLUR, HIGHLIGHT_STREAM, LAMP_LOOKS, LEAST_SEEN, highlights
 from .patches import EMITTERS, NO_PATCH, Part
 from .reference_emitters import ReferenceEmitters
 from .reference_lamps import ReferenceLamps
@@ -29,6 +30,8 @@ from .sampling import keys_of, sample_cosine, sample_r2, sample_r3, shifted
 _RAY_STREAM = 0x85EBCA6B  # of the directions of rays between patches
 
 
+# Of the light, and of each the irradiance (N, 3) of patches, and their luminance (N,) if nothing stood between.
+Parts = Mapping[Part, tuple[np.ndarray, np.ndarray]]
 Lit = tuple[np.ndarray, np.ndarray]  # points (N, POINTS, 4) and sheets (N,) of patches, or of texels
 
 
@@ -74,7 +77,7 @@ class ReferenceHighlights:
         positions: np.ndarray,
         nodes: np.ndarray,
         patch: np.ndarray,
-        parts: Mapping[Part, np.ndarray],
+        parts: Parts,
         face: int,
         seed: int,
     ) -> np.ndarray:
@@ -91,7 +94,7 @@ class ReferenceHighlights:
         keys = keys_of(nodes[some // texels], HIGHLIGHT_STREAM, seed)
         seen = -np.einsum("ni,ni->n", middle.ways.direction, middle.ways.surface.normal)
         left = middle.ways.surface.albedo / np.maximum(albedo_towards(rows, mean, seen), 1e-9)
-        for part, irradiance in parts.items():
+        for part, (irradiance, unshadowed) in parts.items():
             looks = EMITTER_LOOKS if part == EMITTERS else LAMP_LOOKS
             total, weights = np.zeros((len(some), 3)), np.zeros(len(some))
             for look in range(looks):
@@ -100,8 +103,7 @@ class ReferenceHighlights:
                 role = self.scene.role[triangle[some]]
                 places = _Places(way.position, way.surface.normal, -way.direction, rows, mean, role)
                 _add(total, weights, self._look(part, places, width, keys, numbers))
-            mean_highlight = total / np.where(weights > 0, weights, 1.0)[:, None]
-            result[some] += irradiance[patch[some]] * left * mean_highlight
+            result[some] += irradiance[patch[some]] * left * _mean(total, weights, looks * unshadowed[patch[some]])
         return result.reshape(probes, texels, 3)
 
     def _middle(self, surfaces: Surfaces, positions: np.ndarray, some: np.ndarray, face: int):
@@ -123,9 +125,7 @@ class ReferenceHighlights:
         places = GlossyPlaces(rows, mean, flat.normal, np.where(facing, -across, across), -directions)
         return Middle(ways, places, origin, some % texels, face, self.scene), rows, mean
 
-    def of_rays(
-        self, leaving: Lit, patches: Lit, rays: EndedRays, parts: Mapping[Part, np.ndarray], seed: int
-    ) -> np.ndarray:
+    def of_rays(self, leaving: Lit, patches: Lit, rays: EndedRays, parts: Parts, seed: int) -> np.ndarray:
         """(C, 3) irradiance beyond the even one of ``leaving`` (C), by what their ``rays`` find of the ``parts`` of the
         light at ``patches`` (N). Of mirrors on the way nothing is known."""
         (points, sheets), ends = patches, rays.ends
@@ -146,13 +146,15 @@ class ReferenceHighlights:
         back = rays.reflected.reshape(-1, 3)[ray] / np.maximum(albedo_towards(rows, albedo[end], cosine), 1e-9)
         back[cosine <= 0] = 0.0
         result = np.zeros((count * each, 3))
-        for part, irradiance in parts.items():
-            found, weight = self._look(part, places, width, shifted(keys, 0, HIGHLIGHT_STREAM, 0), number)
-            result[ray] += back * irradiance[end] * np.pi * found / np.where(weight > 0, weight, 1.0)[:, None]
+        for part, (irradiance, unshadowed) in parts.items():
+            look = self._look(part, places, width, shifted(keys, 0, HIGHLIGHT_STREAM, 0), number)
+            result[ray] += back * irradiance[end] * np.pi * _mean(*look, unshadowed[end])
         counted = np.maximum((ends != NO_PATCH).sum(axis=1), 1)
         return result.reshape(count, each, 3).sum(axis=1) / counted[:, None]
 
-    def _look(self, part: Part, places: _Places, width: np.ndarray, keys: np.ndarray, index: np.ndarray):
+    def _look(
+        self, part: Part, places: _Places, width: np.ndarray, keys: np.ndarray, index: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Sum of highlights (N, 3) by weight and sum of weights (N,), of one look at ``part`` of the light."""
         coupling = couplings(places.rows, places.albedo)
         total, weights = np.zeros_like(places.position), np.zeros(len(places.position))
@@ -178,9 +180,16 @@ class ReferenceHighlights:
 
 
 def _highlight(places: _Places, towards: np.ndarray, irradiance: np.ndarray, width: np.ndarray):
-    weight = np.abs(irradiance).sum(axis=1)
+    weight = np.abs(irradiance) @ LUMINANCE
     found = highlights(places.rows, places.albedo, places.normal, places.view, towards, width)
     return weight[:, None] * found, weight
+
+
+def _mean(total: np.ndarray, weights: np.ndarray, whole: np.ndarray) -> np.ndarray:
+    """(N, 3) mean highlight of looks: those that see much less of the light than the patch as a whole, ``whole`` (N,),
+    show less of it."""
+    weights = np.maximum(weights, LEAST_SEEN * whole)
+    return total / np.where(weights > 0, weights, 1.0)[:, None]
 
 
 def _add(total: np.ndarray, weights: np.ndarray, look: tuple[np.ndarray, np.ndarray]) -> None:

@@ -63,7 +63,8 @@ class ReferenceLight:
         self.scene, self.settings = scene, settings
         self.patches = Patches(grid)
         self.emitters = ReferenceEmitters(scene, sampling_density(scene.snapshot, grid))
-        self.direct_by_part: dict[Part, np.ndarray] = {}  # (N, 3) each
+        # Of each part the irradiance (N, 3), and the luminance (N,) if nothing stood between.
+        self.direct_by_part: dict[Part, tuple[np.ndarray, np.ndarray]] = {}
         rest, suns = extract_suns(scene.snapshot.world)
         self._lamps = ReferenceLamps(scene, suns)
         self._world = world_texels(rest, settings.face).reshape(-1, 3)
@@ -109,7 +110,7 @@ class ReferenceLight:
     @property
     def direct(self) -> np.ndarray:
         """(N, 3) irradiance of patches by lamps and sampled emitters."""
-        return sum(self.direct_by_part.values(), np.zeros((self._lit, 3)))
+        return sum((values for values, _ in self.direct_by_part.values()), np.zeros((self._lit, 3)))
 
     # Direct light
     # ------------------------------------------------------------------------------------------------------------------
@@ -139,8 +140,8 @@ class ReferenceLight:
                 direct[chosen] += self.direct_light(
                     self.patches.points, numbers[chosen], samples * self._effort, part=part, sheets=sheets
                 )
-            before = self.direct_by_part.get(part, np.zeros((lit, 3)))
-            self.direct_by_part[part] = np.concatenate([before, direct])
+            values, unshadowed = self.direct_by_part.get(part, (np.zeros((lit, 3)), np.zeros(lit)))
+            self.direct_by_part[part] = np.concatenate([values, direct]), np.concatenate([unshadowed, mean])
 
     def spread(
         self, points: np.ndarray, numbers: np.ndarray, part: Part, sheets: np.ndarray | None = None

@@ -15,7 +15,7 @@ from ..core.gloss import (
     TEXEL_LOOKS,
     TEXEL_RAYS,
 )
-from ..core.highlights import EMITTER_LOOKS, HIGHLIGHT_BLUR, HIGHLIGHT_STREAM, LAMP_LOOKS
+from ..core.highlights import EMITTER_LOOKS, HIGHLIGHT_BLUR, HIGHLIGHT_STREAM, LAMP_LOOKS, LEAST_SEEN
 from ..core.patches import POINTS
 from .create_infos import (
     _PROBE_FILES,
@@ -102,9 +102,10 @@ def highlight_numbers(info, defines: dict) -> None:
 def _highlights(info, defines: dict) -> int:
     """What highlight_lib reads, the irradiance of the part of the light that is meant among it."""
     highlight_numbers(info, {})
+    info.define("LEAST_SEEN", str(LEAST_SEEN))
     _ints(info, *(() if "HAS_EMITTERS" in defines else ("first_light", "last_light")), "light_count", "seed")
     slot = _emitters(info, defines, _scene(info, defines))
-    return _samplers(info, "lights", "part_irradiance", first=slot)
+    return _samplers(info, "lights", "part_irradiance", "part_spread", first=slot)
 
 
 def _highlight_files(defines: dict) -> list[str]:

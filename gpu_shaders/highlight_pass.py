@@ -16,7 +16,8 @@ from .places import Places
 from .programs import program
 from .scene_textures import SceneTextures
 
-Parts = Iterable[tuple[Part, gpu.types.GPUTexture]]  # of the light, and the irradiance of each, an element a patch
+# Of the light, and of each the irradiance and how unevenly it would fall if nothing stood between, an element a patch.
+Parts = Iterable[tuple[Part, gpu.types.GPUTexture, gpu.types.GPUTexture]]
 _Where = tuple[gpu.types.GPUTexture, int, dict, tuple[gpu.types.GPUTexture, int]]
 
 
@@ -33,9 +34,9 @@ def add_highlights(
     probes, the one of layer 0, the images of texel surfaces, a list of their layers and its length."""
     probe_slots, first_slot, textures, (listed, count) = where
     sizes = {"BANDS": settings.bands, "COEFFICIENTS": settings.bands**2, "GROUP": group, "FACE": settings.face}
-    for part, irradiance in parts:
+    for part, *falling in parts:
         shader = program("highlight_project_comp", **sizes, **_defines(scene, part))
-        _bind(scene, shader, part, irradiance, settings.seed)
+        _bind(scene, shader, part, falling, settings.seed)
         scene.bind_sheets(shader)
         for name, texture in (
             ("probe_slots", probe_slots),
@@ -69,10 +70,10 @@ def find_highlights(
     """What ``rays`` bring of highlights by ``parts`` of the light of ``patches``, into ``target``, an element a place
     of the rays."""
     target.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
-    for part, irradiance in parts:
+    for part, *falling in parts:
         defines = _defines(scene, part) | {"HAS_MIRRORS": scene.has_gloss}
         shader = program("patch_highlights_comp", POINTS=rays.places.each, **defines)
-        _bind(scene, shader, part, irradiance, seed)
+        _bind(scene, shader, part, falling, seed)
         scene.bind_sheets(shader, patches.sheets)
         if rays.places.sheets is not None:
             shader.uniform_sampler("leaving_sheets", rays.places.sheets)
@@ -95,7 +96,7 @@ def _defines(scene: SceneTextures, part: Part) -> dict:
     return defines | {"HAS_EMITTERS": part == EMITTERS, "HAS_COUPLING": True}
 
 
-def _bind(scene: SceneTextures, shader, part: Part, irradiance: gpu.types.GPUTexture, seed: int) -> None:
+def _bind(scene: SceneTextures, shader, part: Part, falling: list[gpu.types.GPUTexture], seed: int) -> None:
     scene.bind_surfaces(shader)
     scene.bind(shader, "lights")
     if isinstance(part, tuple):
@@ -103,5 +104,6 @@ def _bind(scene: SceneTextures, shader, part: Part, irradiance: gpu.types.GPUTex
             shader.uniform_int(name, (value,))
     else:
         scene.bind_emitters(shader)
-    shader.uniform_sampler("part_irradiance", irradiance)
+    for name, texture in zip(("part_irradiance", "part_spread"), falling):
+        shader.uniform_sampler(name, texture)
     shader.uniform_int("seed", (seed,))

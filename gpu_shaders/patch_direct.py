@@ -67,9 +67,10 @@ class PatchDirect:
     def texture(self) -> gpu.types.GPUTexture:
         return self._total.texture
 
-    def by_part(self) -> list[tuple[Part, gpu.types.GPUTexture]]:
-        """The parts of the light and the irradiance of each, an element a patch."""
-        return [(part, light.values.texture) for part, light in self._parts.items()]
+    def by_part(self) -> list[tuple[Part, gpu.types.GPUTexture, gpu.types.GPUTexture]]:
+        """The parts of the light, and of each the irradiance and how unevenly it would fall if nothing stood between
+        (see ``find_spread``), an element a patch."""
+        return [(part, light.values.texture, light.spread.texture) for part, light in self._parts.items()]
 
     def add(self, places: Places, count: int) -> Steps[None]:
         """Lights those of ``count`` patches at ``places`` that are not lit yet, in steps."""

@@ -116,8 +116,8 @@ class PatchLight:
         """Irradiance by lamps and sampled emitters, an element a patch."""
         return self._direct.texture
 
-    def direct_by_part(self) -> list[tuple[Part, gpu.types.GPUTexture]]:
-        """The same by each part of the light."""
+    def direct_by_part(self) -> list[tuple[Part, gpu.types.GPUTexture, gpu.types.GPUTexture]]:
+        """The same by each part of the light, and how unevenly that would fall if nothing stood between."""
         return self._direct.by_part()
 
     # Rays

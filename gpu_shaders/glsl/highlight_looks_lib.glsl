@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Looks at lamps and sampled emitters, for highlights of a patch's light. */
 
+const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
+
 struct Look {
   vec3 sum; /* of highlights by weight */
   float weight;
@@ -8,7 +10,7 @@ struct Look {
 
 void add_look(inout Look look, FaintGloss faint, Surface surface, vec3 view, vec3 towards, vec3 irradiance, float width)
 {
-  float weight = abs(irradiance.r) + abs(irradiance.g) + abs(irradiance.b);
+  float weight = dot(abs(irradiance), LUMINANCE);
   if (weight > 0.0) {
     look.sum += weight * highlight(faint, surface, view, towards, width);
     look.weight += weight;
@@ -36,4 +38,12 @@ void look_at_part(inout Look look, FaintGloss faint, Surface surface, vec3 view,
     add_look(look, faint, surface, view, light_sample.direction, irradiance, width);
   }
 #endif
+}
+
+/* The mean highlight of so many looks at a patch that gets `unshadowed` luminance if nothing stands between: looks that
+ * see much less than that show less of the light. */
+vec3 mean_look(Look look, int looks, float unshadowed)
+{
+  float weight = max(look.weight, LEAST_SEEN * float(looks) * unshadowed);
+  return weight > 0.0 ? look.sum / weight : vec3(0.0);
 }

@@ -6,7 +6,7 @@
  * With HAS_EMITTERS the part is that of sampled emitters, else that of the lamps first_light .. last_light. LOOKS looks
  * a texel, from places all over it at places all over the lamps, each weighted by what arrives if nothing stands
  * between.
- * part_irradiance: of that part alone, an element a patch
+ * part_irradiance: of that part alone, an element a patch; part_spread: see patch_spread_comp
  * probe_layers, 1 element a probe of the dispatch: its layer; its slot is that much after first_slot
  * Dispatch: one group of GROUP threads a probe. Threads take texels in strides.
  */
@@ -49,7 +49,7 @@ vec3 highlights_of_texel(ivec3 at, vec4 slot)
   }
   /* what holes before the surface leave is in the texel's albedo alone */
   vec3 left = reflects.rgb / max(middle.surface.albedo, vec3(1.0e-9));
-  return look.weight > 0.0 ? irradiance * left * look.sum / look.weight : vec3(0.0);
+  return irradiance * left * mean_look(look, LOOKS, element(part_spread, int(reflects.w)).x);
 }
 
 void main()

@@ -4,7 +4,8 @@
  * Reference: core/highlights.py.
  *
  * Directions are those of patch_rays_comp. Adds to `highlights` of each patch.
- * part_irradiance: of that part alone, an element a patch; couplings, 2 elements a patch: see place_coupling_comp
+ * part_irradiance: of that part alone, an element a patch; part_spread: see patch_spread_comp
+ * couplings, 2 elements a patch: see place_coupling_comp
  * Dispatch: one thread for each of count patches or texels, from number first_key on; groups of 64.
  */
 
@@ -62,10 +63,9 @@ void main()
     Look look = Look(vec3(0.0), 0.0);
     uvec3 light_key = key + uvec3(0u, HIGHLIGHT_STREAM, 0u);
     look_at_part(look, faint, surface, -direction, max(faint.gloss.alpha, PATCH_BLUR), light_key, number);
-    if (look.weight > 0.0) {
-      vec3 evenly = max(albedo_at(faint, surface.mean_albedo, leaving), vec3(1.0e-9));
-      sum += element(reflected, ray).rgb / evenly * irradiance * look.sum * (3.141592653589793 / look.weight);
-    }
+    vec3 evenly = max(albedo_at(faint, surface.mean_albedo, leaving), vec3(1.0e-9));
+    vec3 beyond = mean_look(look, 1, element(part_spread, end).x) * 3.141592653589793;
+    sum += element(reflected, ray).rgb / evenly * irradiance * beyond;
   }
   ivec2 place = element_position(index);
   imageStore(highlights, place, imageLoad(highlights, place) + vec4(sum / float(max(counted, 1)), 0.0));

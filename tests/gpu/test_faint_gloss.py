@@ -98,7 +98,8 @@ def light_by_part(stages):
     stages.direct()
     count, light = stages.light.count, stages.reference.light
     light.direct_by_part = {
-        part: read(values, count)[:, :3].astype(float) for part, values in stages.light.direct_by_part()
+        part: (read(values, count)[:, :3].astype(float), read(spread, count, channels=2)[:, 0].astype(float))
+        for part, values, spread in stages.light.direct_by_part()
     }
     return count
 
