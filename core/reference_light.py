@@ -115,10 +115,6 @@ class ReferenceLight:
     # Direct light
     # ------------------------------------------------------------------------------------------------------------------
 
-    def forget_direct(self) -> None:
-        """No patch is lit."""
-        self.direct_by_part, self._lit = {}, 0
-
     def light_new_patches(self) -> None:
         """Direct light of the patches that were bound since the last call."""
         lit = self._lit

@@ -184,7 +184,7 @@ def test_direct_light_as_the_bake_takes_it(lit):
     """The number of samples by unevenness and effort."""
     light = lit.reference.light
     light.patches.points = lit.points[: len(lit.lit_directly)]
-    light.forget_direct()
+    light.direct_by_part, light._lit = {}, 0
     light.light_new_patches()
     assert close(lit.lit_directly, light.direct, 1e-5).mean() > 0.95
     assert close(lit.lit_directly, light.direct, 0.03).mean() > 0.995
