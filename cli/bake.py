@@ -196,6 +196,7 @@ def run(args, reporter, should_stop):
     from ..scene.open_file import open_blend, set_frame
     from ..scene.probe_objects import edits_of
     from ..scene.read import read_scene
+    from ..scene.volumes import eevee_volumes
     from . import pipeline
     from .relighting import relight_all
     from .result_files import NOT_CONVERGED
@@ -213,6 +214,11 @@ def run(args, reporter, should_stop):
             snapshot = read_scene(scene)
         pipeline.check_snapshot(snapshot, reporter)
         grids = choose_grids(args, snapshot)
+        if not snapshot.volumes and args.min is None and (others := eevee_volumes(scene)):
+            reporter.warn(
+                f"EEVEE's light probe volumes ({', '.join(others)}) are left alone, and a volume was fitted to the scene; "
+                "add one with Add > Light Probe > Gridlight Volume, or give --min and --max"
+            )
         if should_stop():
             raise Cancelled("cancelled")
         pipeline.start_gpu(reporter, stopwatch)

@@ -33,6 +33,11 @@ def is_volume(item: bpy.types.Object | None) -> bool:
     return item is not None and item.type == "EMPTY" and bool(item.get(MARK))
 
 
+def eevee_volumes(scene: bpy.types.Scene) -> list[str]:
+    """Names of EEVEE's own light probe volumes in ``scene``, which a bake leaves alone."""
+    return [item.name for item in scene.objects if item.type == "LIGHT_PROBE" and item.data.type == "VOLUME"]
+
+
 def box_of(item: bpy.types.Object) -> np.ndarray:
     """(4, 4) float64 that maps the box −1..1 to the volume's place in the world, parents and animation included."""
     matrix = np.array(item.matrix_world, float)

@@ -44,6 +44,10 @@ def lamp():
     bpy.context.object.data.energy = 50
 
 
+def eevee_volume():
+    bpy.ops.object.lightprobe_add(type="VOLUME")
+
+
 def volume(name, location):
     def add():
         bpy.ops.object.empty_add(type="CUBE", location=location, radius=0.5)

@@ -7,7 +7,7 @@ import os
 import bpy
 import numpy as np
 import pytest
-from bake_command import BOX, FAST, lamp, room, save, summary_of, volume
+from bake_command import BOX, FAST, eevee_volume, lamp, room, save, summary_of, volume
 from gridlight.core.conventions import ACTIVE, CULLED
 from gridlight.formats import probe_file
 
@@ -56,10 +56,12 @@ def test_several_volumes_give_a_file_each(run_gridlight, tmp_path):
 
 
 @pytest.mark.any_version
-def test_spacing_and_fitted_volume(run_gridlight, lit_room, tmp_path):
+def test_spacing_and_fitted_volume(run_gridlight, tmp_path):
+    """And that volumes of EEVEE's, which nobody reads, do not go without a word."""
+    room_of_eevee = save(tmp_path / "room.blend", room, lamp, eevee_volume)
     done = run_gridlight(
         "bake",
-        lit_room,
+        room_of_eevee,
         "-o",
         tmp_path / "a",
         "--min",
@@ -71,9 +73,11 @@ def test_spacing_and_fitted_volume(run_gridlight, lit_room, tmp_path):
         "--keep-all",
         *FAST,
     )
-    assert summary_of(done)["probes"]["total"] == 5 * 5 * 3
-    done = run_gridlight("bake", lit_room, "-o", tmp_path / "b", "--spacing", "2", *FAST)
+    assert summary_of(done)["probes"]["total"] == 5 * 5 * 3 and not summary_of(done)["warnings"]
+    done = run_gridlight("bake", room_of_eevee, "-o", tmp_path / "b", "--spacing", "2", *FAST)
     assert done.returncode == 0 and summary_of(done)["probes"]["total"] >= 8
+    (warning,) = summary_of(done)["warnings"]
+    assert "EEVEE" in warning and "(Volume)" in warning and "Gridlight Volume" in warning
 
 
 @pytest.mark.any_version
