@@ -216,7 +216,7 @@ def run(args, reporter, should_stop):
         grids = choose_grids(args, snapshot)
         if not snapshot.volumes and args.min is None and (others := eevee_volumes(scene)):
             reporter.warn(
-                f"EEVEE's light probe volumes ({', '.join(others)}) are left alone, and a volume was fitted to the scene; "
+                f"EEVEE's light probe volumes ({', '.join(others)}) are left alone, a volume was fitted to the scene; "
                 "add one with Add > Light Probe > Gridlight Volume, or give --min and --max"
             )
         if should_stop():
