@@ -212,7 +212,8 @@ def _face_slots(mesh: bpy.types.Mesh) -> np.ndarray | None:
 
 
 def _finite(values: np.ndarray) -> np.ndarray:
-    return np.nan_to_num(values, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
+    """``values``, or a copy with 0 for what is not finite."""
+    return values if np.isfinite(values).all() else np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
 
 
 # How the values of an attribute are read: property of its elements and channels.
