@@ -230,7 +230,7 @@ def field_project_comp(info, defines):
     _image(info, 0, "field")
     _ints(info, "first_slot", "own_texels")
     _group_sums(info, defines)
-    return {"compute": [*_PROBE_FILES, "texel_light_lib", "field_project_comp"]}
+    return {"compute": [*_PROBE_FILES, "texel_sum_lib", "texel_light_lib", "field_project_comp"]}
 
 
 def field_gradient_comp(info, defines):
@@ -373,6 +373,7 @@ def emission_project_comp(info, defines):
     return {
         "compute": [
             *_PROBE_FILES,
+            "texel_sum_lib",
             "spherical_harmonics_gradient_lib",
             "probe_emitter_lib",
             *_light_files(defines),

@@ -121,7 +121,7 @@ def highlight_project_comp(info, defines):
     _ints(info, "first_slot")
     _group_sums(info, defines)
     own = ["way_lib", "texel_ways_lib", "highlight_lib", "highlight_looks_lib", "highlight_project_comp"]
-    return {"compute": [*_PROBE_FILES, *_highlight_files(defines), *own]}
+    return {"compute": [*_PROBE_FILES, "texel_sum_lib", *_highlight_files(defines), *own]}
 
 
 def patch_highlights_comp(info, defines):

@@ -109,11 +109,7 @@ void main()
     ivec3 at = ivec3(i % FACE, i / FACE, layer);
     vec3 radiance = texel_emitter(at);
     if (radiance != vec3(0.0)) {
-      sh_basis(texel_direction(at.xy), basis);
-      radiance *= element(texel_weights, (at.y % FACE) * FACE + at.x).x;
-      for (int c = 0; c < COEFFICIENTS; c++) {
-        sum[c] += radiance * basis[c];
-      }
+      add_texel(sum, at, radiance);
     }
   }
   uvec3 key = uvec3(uint(slot.w), 0xB5297A4Du, uint(seed));

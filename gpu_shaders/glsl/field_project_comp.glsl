@@ -21,12 +21,7 @@ void main()
     vec4 emitted = texelFetch(emission, at, 0);
     int own = own_texels != 0 ? probe * 6 * FACE * FACE + i : -1;
     vec3 radiance = texel_reflected(at, own) * 0.3183098861837907 + (emitted.a == 0.0 ? emitted.rgb : vec3(0.0));
-    float basis[COEFFICIENTS];
-    sh_basis(texel_direction(at.xy), basis);
-    radiance *= element(texel_weights, (at.y % FACE) * FACE + at.x).x;
-    for (int c = 0; c < COEFFICIENTS; c++) {
-      sum[c] += radiance * basis[c];
-    }
+    add_texel(sum, at, radiance);
   }
   for (int c = 0; c < COEFFICIENTS; c++) {
     partial_sums[c * GROUP + lane] = vec4(sum[c], 0.0);

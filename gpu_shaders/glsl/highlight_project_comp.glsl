@@ -65,12 +65,7 @@ void main()
     ivec3 at = ivec3(i % FACE, i / FACE, layer);
     vec3 radiance = highlights_of_texel(at, slot);
     if (radiance != vec3(0.0)) {
-      float basis[COEFFICIENTS];
-      sh_basis(texel_direction(at.xy), basis);
-      radiance *= element(texel_weights, (at.y % FACE) * FACE + at.x).x;
-      for (int c = 0; c < COEFFICIENTS; c++) {
-        sum[c] += radiance * basis[c];
-      }
+      add_texel(sum, at, radiance);
     }
   }
   for (int c = 0; c < COEFFICIENTS; c++) {
