@@ -9,8 +9,9 @@ blended so that their directions come to the one asked for: of a flat wall the m
 Points are moved off their surface by a share of the distance to the probe, because a map is as coarse as it is far from
 what it shows. There is no weight for the surface's orientation: it would bend the interpolation in open space, and a
 probe behind a wall is already found by its depth. Culled probes hang in free air, have no statistics and count as seen.
-Points outside the box are clamped to it, but gradients lead on for half a cell. GLSL twin: lookup_lib.glsl and
-field_lib.glsl.
+Where none of the eight sees much of the point, as in a room in which hardly a node stands, those one step around the
+cell are asked, too. Points outside the box are clamped to it, but gradients lead on for half a cell. GLSL twin:
+lookup_lib.glsl and field_lib.glsl.
 """
 
 from __future__ import annotations
@@ -28,6 +29,11 @@ from .grid import Grid
 
 LEAST_WEIGHT = 1e-24  # of an active probe that does not see the point: decides only where none does
 INVALID_WEIGHT = 1e-27  # of probes inside solids, which carry their neighbours' light
+# Where the corners of a cell see less of a point than this, the nodes around the cell are asked, too; theirs is the
+# weight of a node one cell away. So a probe that truly sees a point counts more than a nearer one that hardly does, and
+# nothing jumps where they come in.
+SEEN_ENOUGH = 1e-2
+AROUND_WEIGHT = 1e-4
 ON_BORDER = 1e-4  # of a cell: what is as near to a border lies on it, or rounding would choose between unseen and seen
 BEYOND = 0.5  # cells past the box that gradients lead on
 # Of the distance to the probe: how far points are moved along their normal before they are tested, so that their own
@@ -43,6 +49,8 @@ _SHARPNESS = 10  # power of the chance
 LEAST_DISTANCE = 1e-6  # of the depth clamp: what a surface at no distance counts as
 _POINTS_AT_ONCE = 1 << 13
 _CORNERS = np.array([[corner & 1, corner >> 1 & 1, corner >> 2] for corner in range(8)])
+_NEIGHBOURS = np.array([[node & 3, node >> 2 & 3, node >> 4] for node in range(64)]) - 1
+_AROUND = _NEIGHBOURS[((_NEIGHBOURS < 0) | (_NEIGHBOURS > 1)).any(axis=1)]  # a cell: one step from its corners
 
 
 def depth_clamp(grid: Grid) -> float:
@@ -67,13 +75,43 @@ def grid_info(grid: Grid) -> np.ndarray:
 
 
 def lookup_weights(field: Field, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes (N, 8) and weights (N, 8), summing to 1, that make up the field at ``points`` (N, 3) with ``normals`` (N,
-    3)."""
+    """Nodes (N, K) and weights (N, K), summing to 1, that make up the field at ``points`` (N, 3) with ``normals`` (N,
+    3). The first eight are the corners of the point's cell. K is 64 where the corners of some cell see too little."""
     nodes, weights = trilinear(field.grid, points)
+    weights = weights * _seen(field, nodes, points, normals)
+    lacking = 1.0 - weights.sum(axis=1) / SEEN_ENOUGH
+    hidden = np.flatnonzero(lacking > 0)
+    if len(hidden):
+        around, around_weights = np.repeat(nodes, len(_AROUND) // 8, axis=1), np.zeros((len(nodes), len(_AROUND)))
+        around[hidden], around_weights[hidden] = _around(field, points[hidden], normals[hidden])
+        around_weights *= lacking[:, None]
+        nodes, weights = np.hstack([nodes, around]), np.hstack([weights, around_weights])
+    return nodes, weights / weights.sum(axis=1, keepdims=True)
+
+
+def _seen(field: Field, nodes: np.ndarray, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(N, K) what ``nodes`` (N, K) count by how likely they see their point of ``points`` (N, 3)."""
     state = field.state[nodes]
     seen = np.where(state == ACTIVE, np.maximum(visibility(field, nodes, points, normals), LEAST_WEIGHT), 1.0)
-    weights = weights * np.where(state == INVALID, INVALID_WEIGHT, seen)
-    return nodes, weights / weights.sum(axis=1, keepdims=True)
+    return np.where(state == INVALID, INVALID_WEIGHT, seen)
+
+
+def _around(field: Field, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes (N, 56) one step around the cells of ``points`` (N, 3), and their weights (N, 56): active ones that see the
+    point, by the inverse fourth power of the distance in cells; none from where depth maps do not look as far."""
+    cell, blend, _beyond = _place(field.grid, points)
+    resolution = np.array(field.grid.resolution)
+    at = cell[:, None] + _AROUND
+    node = np.clip(at, 0, resolution - 1)
+    nodes = node[..., 0] + resolution[0] * (node[..., 1] + resolution[1] * node[..., 2])
+    squared = ((blend[:, None] - _AROUND) ** 2).sum(axis=2)
+    apart = np.linalg.norm(points[:, None] - (field.grid.positions()[nodes] + field.offset[nodes]), axis=2)
+    known = (at == node).all(axis=2) & (field.state[nodes] == ACTIVE) & (FARTHEST * apart <= depth_clamp(field.grid))
+    weights = np.where(known, AROUND_WEIGHT / squared**2, 0.0)
+    for first in range(0, len(_AROUND), 8):
+        eight = slice(first, first + 8)
+        weights[:, eight] *= _seen(field, nodes[:, eight], points, normals)
+    return nodes, weights
 
 
 def trilinear(grid: Grid, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -86,9 +124,9 @@ def trilinear(grid: Grid, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def gradient_steps(grid: Grid, points: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """(N, 8, 3) cells along each axis for which gradients of the nodes around ``points`` (N, 3) are followed: half of
+    """(N, 8, 3) cells along each axis for which gradients of the corners around ``points`` (N, 3) are followed: half of
     the way from the node to the point clamped to the box, and up to half a cell on from there. All the less the further
-    ``weights`` (N, 8) are from the trilinear ones, because few probes are left, and far ones."""
+    their ``weights`` (N, 8) are from the trilinear ones, because few probes are left, and far ones."""
     _cell, blend, beyond = _place(grid, points)
     steps = 0.5 * (blend[:, None] - _CORNERS) + np.clip(beyond, -BEYOND, BEYOND)[:, None]
     share = np.minimum(weights, trilinear(grid, points)[1]).sum(axis=1)
@@ -135,9 +173,15 @@ def irradiance(field: Field, points: np.ndarray, normals: np.ndarray) -> np.ndar
     for start in range(0, len(points), _POINTS_AT_ONCE):
         part = slice(start, start + _POINTS_AT_ONCE)
         nodes, weights = lookup_weights(field, points[part], normals[part])
-        steps = gradient_steps(field.grid, points[part], weights) * weights[..., None]
-        blended = np.einsum("nw,nwkc->nkc", weights, field.coefficients[nodes].astype(float))
-        led = np.einsum("nwa,nwakc->nkc", steps, gradient[nodes])
+        blended = np.zeros((len(nodes), *field.coefficients.shape[1:]))
+        for first in range(0, nodes.shape[1], 8):
+            eight = slice(first, first + 8)
+            rows = np.flatnonzero(weights[:, eight].any(axis=1))
+            known = field.coefficients[nodes[rows, eight]].astype(float)
+            blended[rows] += np.einsum("nw,nwkc->nkc", weights[rows, eight], known)
+        corners = weights[:, :8]
+        steps = gradient_steps(field.grid, points[part], corners) * corners[..., None]
+        led = np.einsum("nwa,nwakc->nkc", steps, gradient[nodes[:, :8]])
         blended[:, : led.shape[1]] += led
         result[part] = sh.irradiance(blended, normals[part])
     return result

@@ -19,6 +19,7 @@ NO_SURFACE = "1.0e30"
 _PROBE_FILES = ("data_lib", "octahedral_lib", "cubemap_lib", "spherical_harmonics_lib", "group_sum_lib")
 
 _LOOKUP_CONSTANTS = (
+    "AROUND_WEIGHT",
     "BEYOND",
     "FARTHEST",
     "HIDES",
@@ -27,6 +28,7 @@ _LOOKUP_CONSTANTS = (
     "LEAST_WEIGHT",
     "OFF_SURFACE",
     "ON_BORDER",
+    "SEEN_ENOUGH",
 )
 
 

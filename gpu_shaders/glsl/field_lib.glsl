@@ -1,40 +1,90 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Reading the field: SH of the probes in `field_in`, COEFFICIENTS elements a node, and in `gradient_in` how much they
  * change over one cell along each axis, 3 · TRANSFER_COEFFICIENTS elements a node, axis by axis. Needs
- * spherical_harmonics_lib; grid_info as in lookup_lib. Reference: core/lookup.py.
+ * lookup_lib and spherical_harmonics_lib. Reference: core/lookup.py.
  */
 
-vec3 coefficient_at(int node, int index, vec3 step)
+/* Irradiance of the probe at `node` for the surface that `transfer` is of. */
+vec3 probe_irradiance(int node, float transfer[COEFFICIENTS])
 {
-  vec3 value = element(field_in, node * COEFFICIENTS + index).rgb;
-  for (int axis = 0; axis < 3; axis++) {
-    if (step[axis] != 0.0) {
-      value += step[axis] * element(gradient_in, (node * 3 + axis) * TRANSFER_COEFFICIENTS + index).rgb;
-    }
+  vec3 sum = vec3(0.0);
+  for (int i = 0; i < TRANSFER_COEFFICIENTS; i++) {
+    sum += transfer[i] * element(field_in, node * COEFFICIENTS + i).rgb;
   }
-  return value;
+  return sum;
 }
 
-/* Irradiance at `normal` of the field, blended over the corners of a cell, each led to the point by its gradient: see
- * lookup_cell. May be negative where the series rings. */
-vec3 field_irradiance(int first_node, vec4 weights0, vec4 weights1, vec4 lead, vec3 normal)
+/* How much that changes `step` cells away. */
+vec3 irradiance_change(int node, vec3 step, float transfer[COEFFICIENTS])
 {
-  ivec3 resolution = ivec3(grid_info[3].xyz);
-  float transfer[COEFFICIENTS];
-  sh_cosine_transfer(normal, transfer);
   vec3 sum = vec3(0.0);
-  for (int corner = 0; corner < 8; corner++) {
-    float weight = corner < 4 ? weights0[corner] : weights1[corner - 4];
-    if (weight > 0.0) {
-      ivec3 corner_step = ivec3(corner & 1, (corner >> 1) & 1, corner >> 2);
-      int node = first_node + corner_step.x + resolution.x * (corner_step.y + resolution.y * corner_step.z);
-      vec3 step = lead.w * (lead.xyz - 0.5 * vec3(corner_step));
-      vec3 value = vec3(0.0);
+  for (int axis = 0; axis < 3; axis++) {
+    if (step[axis] != 0.0) {
       for (int i = 0; i < TRANSFER_COEFFICIENTS; i++) {
-        value += transfer[i] * coefficient_at(node, i, step);
+        sum += step[axis] * transfer[i] * element(gradient_in, (node * 3 + axis) * TRANSFER_COEFFICIENTS + i).rgb;
       }
-      sum += weight * value;
     }
   }
   return sum;
+}
+
+/* Irradiance at `point` with `normal` of the field, blended over the corners of its cell, each led to the point by its
+ * gradient; where they see too little, also over the nodes around the cell. May be negative where the series rings. */
+vec3 field_irradiance(vec3 point, vec3 normal)
+{
+  vec3 beyond;
+  vec3 lattice = lattice_position(point, beyond);
+  ivec3 cell = first_corner(lattice);
+  vec3 blend = lattice - vec3(cell);
+  vec3 border = floor(blend + 0.5);
+  blend = mix(blend, border, lessThan(abs(blend - border), vec3(ON_BORDER)));
+  vec3 lead = 0.5 * blend + clamp(beyond, -BEYOND, BEYOND);
+  float transfer[COEFFICIENTS];
+  sh_cosine_transfer(normal, transfer);
+  ivec3 last = ivec3(grid_info[3].xyz) - 1;
+  float plain[8], weights[8];
+  float sum = 0.0, around = 0.0;
+  vec3 value = vec3(0.0), change = vec3(0.0);
+  for (int item = 0; item < 8 + 64; item++) {
+    if (item == 8) {
+      around = AROUND_WEIGHT * (1.0 - sum / SEEN_ENOUGH);
+      if (around <= 0.0) {
+        break;
+      }
+    }
+    ivec3 step = lookup_step(item);
+    ivec3 node = cell + step;
+    float weight;
+    if (item < 8) {
+      vec3 part = mix(1.0 - blend, blend, vec3(step));
+      weight = part.x * part.y * part.z;
+      plain[item] = weight;
+      weights[item] = 0.0;
+    }
+    else {
+      vec3 apart = blend - vec3(step);
+      float squared = dot(apart, apart);
+      bool asked = !is_corner(step) && all(greaterThanEqual(node, ivec3(0))) && all(lessThanEqual(node, last));
+      weight = asked ? around / (squared * squared) : 0.0;
+    }
+    if (weight > 0.0) {
+      int index = node_index(node);
+      vec4 place = element(grid_nodes, index);
+      if (item >= 8 && (place.w < 0.0 || FARTHEST * distance(place.xyz, point) > grid_info[3].w)) {
+        continue; /* knows nothing of it */
+      }
+      weight *= seen_weight(place, point, normal);
+      sum += weight;
+      value += weight * probe_irradiance(index, transfer);
+      if (item < 8) {
+        weights[item] = weight;
+        change += weight * irradiance_change(index, lead - 0.5 * vec3(step), transfer);
+      }
+    }
+  }
+  float share = 0.0; /* of the trilinear blend that visibility left */
+  for (int corner = 0; corner < 8; corner++) {
+    share += min(weights[corner] / sum, plain[corner]);
+  }
+  return (value + share * change) / sum;
 }

@@ -120,40 +120,27 @@ ivec3 first_corner(vec3 lattice)
   return min(ivec3(lattice), max(ivec3(grid_info[3].xyz) - 2, ivec3(0)));
 }
 
-/* First corner of the cell around `point` and the weights of its eight corners (x fastest), which sum to 1. `lead`:
- * cells for which the gradient of the first corner is followed, half a step less for every step to another corner;
- * share of the trilinear blend that visibility left. */
-ivec3 lookup_cell(vec3 point, vec3 normal, out float weights[8], out vec4 lead)
+/* What a node, as grid_nodes has it, counts by how likely it sees `point`. */
+float seen_weight(vec4 node, vec3 point, vec3 normal)
 {
-  vec3 beyond;
-  vec3 lattice = lattice_position(point, beyond);
-  ivec3 cell = first_corner(lattice);
-  vec3 blend = lattice - vec3(cell);
-  vec3 border = floor(blend + 0.5);
-  blend = mix(blend, border, lessThan(abs(blend - border), vec3(ON_BORDER)));
-  lead = vec4(0.5 * blend + clamp(beyond, -BEYOND, BEYOND), 0.0);
-  float plain[8];
-  float sum = 0.0;
-  for (int corner = 0; corner < 8; corner++) {
-    ivec3 step = ivec3(corner & 1, (corner >> 1) & 1, corner >> 2);
-    vec3 part = mix(1.0 - blend, blend, vec3(step));
-    float weight = part.x * part.y * part.z;
-    plain[corner] = weight;
-    if (weight > 0.0) {
-      vec4 node = element(grid_nodes, node_index(cell + step));
-      if (node.w >= 0.0) {
-        weight *= max(visibility(int(node.w), node.xyz, point, normal), LEAST_WEIGHT);
-      }
-      else if (node.w < -1.0) {
-        weight *= INVALID_WEIGHT;
-      }
-    }
-    weights[corner] = weight;
-    sum += weight;
+  if (node.w >= 0.0) {
+    return max(visibility(int(node.w), node.xyz, point, normal), LEAST_WEIGHT);
   }
-  for (int corner = 0; corner < 8; corner++) {
-    weights[corner] /= sum;
-    lead.w += min(weights[corner], plain[corner]);
+  return node.w < -1.0 ? INVALID_WEIGHT : 1.0;
+}
+
+/* Step from the first corner of a cell to what is asked there as number `item`: its eight corners (x fastest), then the
+ * 4 × 4 × 4 nodes that reach one step around, corners among them. */
+ivec3 lookup_step(int item)
+{
+  if (item < 8) {
+    return ivec3(item & 1, (item >> 1) & 1, item >> 2);
   }
-  return cell;
+  item -= 8;
+  return ivec3(item & 3, (item >> 2) & 3, item >> 4) - 1;
+}
+
+bool is_corner(ivec3 step)
+{
+  return all(greaterThanEqual(step, ivec3(0))) && all(lessThanEqual(step, ivec3(1)));
 }

@@ -59,8 +59,9 @@ vec3 shade_probe(int mark, vec3 normal)
     return display_to_linear(state_color(mark));
   }
   if (shade_info[1].w == 0.0) {
-    vec3 irradiance = field_irradiance(mark, vec4(1.0, 0.0, 0.0, 0.0), vec4(0.0), vec4(0.0), normal);
-    return max(irradiance, vec3(0.0)) * 0.3183098861837907;
+    float transfer[COEFFICIENTS];
+    sh_cosine_transfer(normal, transfer);
+    return max(probe_irradiance(mark, transfer), vec3(0.0)) * 0.3183098861837907;
   }
   float basis[COEFFICIENTS];
   sh_basis(normal, basis);

@@ -26,12 +26,7 @@ vec3 lamps_radiance(Surface surface, vec3 direction, vec3 origin, uvec3 key, int
 #ifdef HAS_FIELD
 vec3 field_irradiance_at(vec3 point, vec3 normal)
 {
-  float weights[8];
-  vec4 lead;
-  int first_node = node_index(lookup_cell(point - shade_info[0].xyz, normal, weights, lead));
-  return max(field_irradiance(first_node, vec4(weights[0], weights[1], weights[2], weights[3]),
-                              vec4(weights[4], weights[5], weights[6], weights[7]), lead, normal),
-             vec3(0.0));
+  return max(field_irradiance(point - shade_info[0].xyz, normal), vec3(0.0));
 }
 
 /* Validity blended as the grid lies in space, or the cell's error. */
