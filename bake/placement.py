@@ -156,7 +156,29 @@ def _relocate(
         yield from _stand(placement, np.flatnonzero(back), batches, backend)
         placement.went_back |= back
         leaving, beside = back, np.zeros_like(beside)
+    yield from _step_inwards(placement, batches, backend, grid, obstacles)
     placement.went_back &= ~placement.moved
+
+
+def _step_inwards(
+    placement: Placement, batches: Batches, backend: GpuBackend, grid: Grid, obstacles: Callable[[], Obstacles]
+) -> Steps[None]:
+    """Moves probes that went back from all their ways out away from the faces of the box, if they stand better
+    there."""
+    for cells in relocation.INWARD_CELLS:
+        lost = np.flatnonzero(placement.went_back & ~placement.moved)
+        step = relocation.inward(grid, placement.nodes[lost], cells)
+        lost, step = lost[step.any(axis=1)], step[step.any(axis=1)]
+        if not len(lost):
+            return
+        placement.step[lost] = step
+        settled = np.zeros_like(placement.went_back)
+        settled[lost] = True
+        yield from _keep_clear(placement, settled, batches, grid, obstacles)
+        yield from _stand(placement, lost, batches, backend)
+        still = lost[placement.misplaced_now()[lost]]
+        placement.step[still] = 0.0
+        yield from _stand(placement, still, batches, backend)
 
 
 def _leave(

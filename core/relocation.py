@@ -4,7 +4,8 @@
 A volume that reaches into its walls has a layer of nodes that see nothing, while the wall's surface then reads only
 the next layer inside. A probe without light whose nearest surface is close is captured from the other side of that
 surface, never farther than half a cell from its node, so that it stays the nearest probe of its part of the room. In an
-edge or a corner of a room there is another wall behind the first: ways out may follow one another.
+edge or a corner of a room there is another wall behind the first: ways out may follow one another. Where walls overlap
+all of them may lead outside or to the next wall; the last way is a share of a cell into the volume.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ _MARGIN = 0.05  # cells between a moved probe and the surface it came through
 _OPPOSITE = 0.5  # cosine beyond which a way leads to the other side of a wall
 _ALIKE = 1e-3  # relative difference of costs that tells nothing
 _BACK = 0.15  # cosine beyond which a way leads back to where a probe came from
+INWARD_CELLS = (0.25, 0.5)  # of the last way, one after the other
 _OUTWARD_PENALTY = 0.5  # how much farther than inwards the way out of the volume counts
 
 
@@ -57,3 +59,12 @@ def moves(grid: Grid, home: np.ndarray, exits: np.ndarray, moved: np.ndarray, fa
     best = (cost <= (1.0 + _ALIKE) * cost.min(axis=1, keepdims=True)).argmax(axis=1)
     row = np.arange(len(home))
     return np.where(np.isfinite(cost[row, best])[:, None], step[row, best], 0.0)
+
+
+def inward(grid: Grid, nodes: np.ndarray, cells: float) -> np.ndarray:
+    """(L, 3) displacement in metres by which ``nodes`` (L,) on faces of the box move ``cells`` away from each of them;
+    0 for others, and along axes with one node."""
+    lattice = grid.lattice()[nodes]
+    last = np.array(grid.resolution) - 1
+    towards = np.where(last > 0, (lattice == 0).astype(float) - (lattice == last), 0.0)
+    return cells * towards @ (2.0 * grid.matrix[:3, :3] / np.maximum(last, 1)).T

@@ -3,7 +3,7 @@
 
 import numpy as np
 from gridlight.core.grid import Grid
-from gridlight.core.relocation import moves
+from gridlight.core.relocation import inward, moves
 
 GRID = Grid.from_bounds((0, 0, 0), (4, 4, 4), (5, 5, 5))  # cells of 1 m
 HOME = np.array([[0.1, 0.1, 0.1]])
@@ -44,3 +44,13 @@ def test_a_way_that_led_nowhere_is_not_tried_again():
     np.testing.assert_allclose(first, [[0.15, 0, 0]])
     np.testing.assert_allclose(moves(GRID, HOME, out, STILL, first), [[-0.25, 0, 0]])
     assert not moves(GRID, HOME, exits_of(0.1, *[NOWHERE] * 5), STILL, first).any()
+
+
+def test_the_last_way_leads_away_from_the_faces_of_the_box():
+    turn = np.array([[0, -1.0, 0], [1, 0, 0], [0, 0, 1]])
+    matrix = np.eye(4)
+    matrix[:3, :3] = turn * [4.0, 2.0, 1.0]
+    volume = Grid(matrix, (5, 3, 1))  # cells of 2 m along both axes, one layer
+    corner, side, middle, end = 0, 2, 7, 14
+    found = inward(volume, np.array([corner, side, middle, end]), 0.25)
+    np.testing.assert_allclose(found, np.array([[0.5, 0.5, 0], [0, 0.5, 0], [0, 0, 0], [-0.5, -0.5, 0]]) @ turn.T)
