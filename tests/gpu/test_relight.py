@@ -100,14 +100,22 @@ def without(snapshot, item):
     return replace(snapshot, **arrays)
 
 
-def assert_same_bake(found, expected):
-    """Field, states and statistics agree to 1e-5."""
+def assert_same_bake(found, expected, torn=0):
+    """Field, states and statistics agree to 1e-5, but for ``torn`` probes, of which one texel may see something else: a
+    ray along an edge meets either of its triangles, whichever the hierarchy comes to first, and one that followed
+    changes is not in the order of one built anew."""
     np.testing.assert_array_equal(found.field.state, expected.field.state)
     np.testing.assert_allclose(found.field.offset, expected.field.offset, atol=1e-6)
     np.testing.assert_allclose(found.field.validity, expected.field.validity, atol=1e-5)
-    np.testing.assert_allclose(found.field.depth, expected.field.depth, rtol=1e-5, atol=1e-6)
     scale = np.abs(expected.field.coefficients).max()
-    np.testing.assert_allclose(found.field.coefficients, expected.field.coefficients, atol=1e-5 * scale)
+    apart = np.abs(found.field.coefficients - expected.field.coefficients).max(axis=(1, 2)) / scale
+    farther = np.abs(found.field.depth - expected.field.depth) > 1e-6 + 1e-5 * np.abs(expected.field.depth)
+    differ = (apart > 1e-5) | farther.any(axis=(1, 2))
+    assert differ.sum() <= torn, (
+        f"probes {np.flatnonzero(differ)} differ, by {apart[differ]} of the largest coefficient"
+    )
+    texel = 1 / (6 * SETTINGS["face"] ** 2)  # of the sphere
+    assert (apart[differ] < 4 * texel).all() and (farther[differ].any(axis=2).sum(axis=1) <= 4).all()
     assert found.counts == expected.counts
 
 
@@ -339,7 +347,7 @@ def test_probes_come_and_go_with_surfaces():
         relit = session.result.relit
         assert (session.result.field.state != before).any()
         assert 0 < relit.probes_captured < relit.probes or offset < -3
-        assert_same_bake(session.result, bake(new, where, session.settings))
+        assert_same_bake(session.result, bake(new, where, session.settings), torn=1)
 
 
 @pytest.mark.nightly
