@@ -51,10 +51,10 @@ def inset_by(inset: float, resolution: tuple[int, int, int]) -> Grid:
     return Grid.from_bounds((inset,) * 3, (far - inset, ROOM_M - inset, ROOM_M - inset), resolution)
 
 
-def at_random(count: int) -> list[Grid]:
+def at_random(count: int, seed: int) -> list[Grid]:
     """Volumes that nobody chose: 40 cm inset to 15 cm into the walls, 2,2,2 to 7,4,4 nodes, every second one turned
     about z by 5 to 85° and so large that it holds the same, and much that is outside."""
-    random = np.random.default_rng(1)
+    random = np.random.default_rng(seed)
     grids = []
     for number in range(count):
         x, y, z = (int(random.integers(2, most + 1)) for most in (7, 4, 4))

@@ -5,6 +5,7 @@
 """
 
 import measured_leaks
+import numpy as np
 import pytest
 
 pytestmark = [pytest.mark.any_version, pytest.mark.nightly]
@@ -25,13 +26,15 @@ def test_light_behind_a_wall(gpu_context, where, inset, resolution):
 
 
 @pytest.mark.gpu
-def test_volumes_that_nobody_chose(gpu_context):
+@pytest.mark.parametrize("seed", [1, 2])
+def test_volumes_that_nobody_chose(gpu_context, seed):
     leaks = []
-    for grid in measured_leaks.at_random(44):
+    for grid in measured_leaks.at_random(44, seed):
         leaks.append(measured_leaks.leak(measured_leaks.bake(grid)).largest_mean)
         if leaks[-1] > measured_leaks.MOST_LEAK:
             cell = " × ".join(f"{edge:.1f}" for edge in grid.cell_size())
             print(f"\n{grid.resolution}, cells of {cell} m: {100 * leaks[-1]:.2f} %")
     above = sum(leak > measured_leaks.MOST_LEAK for leak in leaks)
     print(f"\n{above} of {len(leaks)} above {100 * measured_leaks.MOST_LEAK:g} %, most {100 * max(leaks):.2f} %")
-    assert above < MOST_ABOVE * len(leaks) and max(leaks) < MOST_AT_RANDOM
+    assert np.isfinite(leaks).all(), "a volume found no light"
+    assert above <= MOST_ABOVE * len(leaks) and max(leaks) < MOST_AT_RANDOM
