@@ -63,59 +63,68 @@ vec3 profile_factor(int light, int profile, vec3 direction, float distance)
 }
 #endif
 
-LightSample sample_plain_light(int light, vec3 point, vec2 u)
+/* Uniform in the cone of half the apparent angle. Its radiance is strength/(π sin²), so that a facing surface gets
+ * exactly the strength; `radius` of a sun is 1 − cos of that half angle. */
+LightSample sample_sun(int light, vec2 u)
+{
+  vec4 color_radius = element(lights, 6 * light + 1);
+  vec3 back = element(lights, 6 * light + 4).xyz, t, b;
+  tangent_frame(back, t, b);
+  float cosine = 1.0 - u.x * color_radius.w;
+  float sine = sqrt(max(1.0 - cosine * cosine, 0.0)), phi = 6.283185307179586 * u.y;
+  LightSample light_sample;
+  light_sample.direction = cosine * back + sine * (cos(phi) * t + sin(phi) * b);
+  light_sample.distance = NO_HIT;
+  light_sample.irradiance = color_radius.rgb * (2.0 / (2.0 - color_radius.w));
+  return light_sample;
+}
+
+/* Uniform on the face, which shines along −back: the surface must lie in front of it. */
+LightSample sample_area(int light, vec3 point, vec2 u)
 {
   vec4 position_kind = element(lights, 6 * light);
-  vec4 color_radius = element(lights, 6 * light + 1);
-  vec4 back_shadow = element(lights, 6 * light + 4);
+  vec4 right = element(lights, 6 * light + 2);
+  vec4 up = element(lights, 6 * light + 3);
   vec4 parameters = element(lights, 6 * light + 5);
-  int kind = int(position_kind.w);
-  float radius = color_radius.w;
+  bool is_ellipse = int(position_kind.w) == ELLIPSE;
+  vec2 place = is_ellipse ? 0.5 * sample_disk(u) : u - 0.5;
+  vec3 to_light = position_kind.xyz - point + place.x * right.w * right.xyz + place.y * up.w * up.xyz;
   LightSample light_sample;
-  vec3 t, b;
+  light_sample.distance = length(to_light);
+  light_sample.direction = to_light / max(light_sample.distance, 1.0e-20);
+  float cosine = dot(light_sample.direction, element(lights, 6 * light + 4).xyz);
+  float area = right.w * up.w * (is_ellipse ? 0.7853981633974483 : 1.0);
+  float spread = 1.0;
+  if (parameters.y > 0.0) {
+    float tangent = sqrt(max(1.0 - cosine * cosine, 0.0)) / max(cosine, 1.0e-6);
+    spread = max((parameters.x - tangent) * parameters.y, 0.0);
+  }
+  light_sample.irradiance = element(lights, 6 * light + 1).rgb *
+                            (spread * max(cosine, 0.0) * area /
+                             max(light_sample.distance * light_sample.distance, 1.0e-20));
+  return light_sample;
+}
 
-  if (kind == SUN) {
-    /* a cone of radiance strength/(π sin²), so that a facing surface gets exactly the strength; radius is 1 − cos of
-     * half the apparent angle */
-    tangent_frame(back_shadow.xyz, t, b);
-    float cosine = 1.0 - u.x * radius;
-    float sine = sqrt(max(1.0 - cosine * cosine, 0.0)), phi = 6.283185307179586 * u.y;
-    light_sample.direction = cosine * back_shadow.xyz + sine * (cos(phi) * t + sin(phi) * b);
-    light_sample.distance = NO_HIT;
-    light_sample.irradiance = color_radius.rgb * (2.0 / (2.0 - radius));
-    return light_sample;
-  }
-  vec3 to_centre = position_kind.xyz - point;
-  if (kind >= RECTANGLE) {
-    vec4 right = element(lights, 6 * light + 2);
-    vec4 up = element(lights, 6 * light + 3);
-    vec2 place = kind == ELLIPSE ? 0.5 * sample_disk(u) : u - 0.5;
-    vec3 to_light = to_centre + place.x * right.w * right.xyz + place.y * up.w * up.xyz;
-    light_sample.distance = length(to_light);
-    light_sample.direction = to_light / max(light_sample.distance, 1.0e-20);
-    /* the light shines along −back: the surface must lie in front of it */
-    float cosine = dot(light_sample.direction, back_shadow.xyz);
-    float area = right.w * up.w * (kind == ELLIPSE ? 0.7853981633974483 : 1.0);
-    float spread = 1.0;
-    if (parameters.y > 0.0) {
-      float tangent = sqrt(max(1.0 - cosine * cosine, 0.0)) / max(cosine, 1.0e-6);
-      spread = max((parameters.x - tangent) * parameters.y, 0.0);
-    }
-    light_sample.irradiance = color_radius.rgb * (spread * max(cosine, 0.0) * area /
-                                                  max(light_sample.distance * light_sample.distance, 1.0e-20));
-    return light_sample;
-  }
+/* Falloff of points and spots of radiant intensity I: I/d² without a radius r. With one, a disk of radiance I/(πr²)
+ * that faces the surface (soft falloff, and whatever lies within the radius), or else a sphere of that radiance,
+ * sampled over the cone that it fills. */
+LightSample sample_point(int light, vec3 point, vec2 u)
+{
+  vec4 color_radius = element(lights, 6 * light + 1);
+  float radius = color_radius.w;
+  bool is_soft = element(lights, 6 * light + 5).z != 0.0;
+  vec3 to_centre = element(lights, 6 * light).xyz - point, t, b;
   float squared = max(dot(to_centre, to_centre), 1.0e-20);
   float centre_distance = sqrt(squared);
   vec3 axis = to_centre / centre_distance;
   tangent_frame(axis, t, b);
+  LightSample light_sample;
   if (radius == 0.0) {
     light_sample.direction = axis;
     light_sample.distance = centre_distance;
     light_sample.irradiance = color_radius.rgb / squared;
   }
-  else if (parameters.z != 0.0 || centre_distance <= radius) {
-    /* soft falloff: a disk of radiance I/(πr²) that faces the surface */
+  else if (is_soft || centre_distance <= radius) {
     vec2 disk = radius * sample_disk(u);
     vec3 to_light = to_centre + disk.x * t + disk.y * b;
     float sample_squared = dot(to_light, to_light);
@@ -124,7 +133,6 @@ LightSample sample_plain_light(int light, vec3 point, vec2 u)
     light_sample.irradiance = color_radius.rgb * centre_distance / (light_sample.distance * sample_squared);
   }
   else {
-    /* a sphere of radiance I/(πr²), sampled over the cone that it fills */
     float sine_squared = radius * radius / squared;
     float cos_max = sqrt(1.0 - sine_squared);
     float one_minus_cos = sine_squared / (1.0 + cos_max);
@@ -136,8 +144,23 @@ LightSample sample_plain_light(int light, vec3 point, vec2 u)
                             sqrt(max(radius * radius - squared * (1.0 - cosine * cosine), 0.0));
     light_sample.irradiance = color_radius.rgb * (2.0 * one_minus_cos / (radius * radius));
   }
+  return light_sample;
+}
+
+/* What a light sends without its nodes. */
+LightSample sample_plain_light(int light, vec3 point, vec2 u)
+{
+  int kind = int(element(lights, 6 * light).w);
+  if (kind == SUN) {
+    return sample_sun(light, u);
+  }
+  if (kind >= RECTANGLE) {
+    return sample_area(light, point, u);
+  }
+  LightSample light_sample = sample_point(light, point, u);
   if (kind == SPOT) {
-    light_sample.irradiance *= spot_mask(light, light_sample.direction, back_shadow.xyz, parameters);
+    light_sample.irradiance *= spot_mask(
+        light, light_sample.direction, element(lights, 6 * light + 4).xyz, element(lights, 6 * light + 5));
   }
   return light_sample;
 }

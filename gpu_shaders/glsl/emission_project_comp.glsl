@@ -89,55 +89,38 @@ int choose_candidates(vec3 origin, uvec3 key, int lane, out float step)
   return min(chosen_count, RAYS);
 }
 
-void main()
+/* What the probe at `origin` gets of a candidate that got `rays` rays of `step` each, added to its coefficients, and
+ * how that changes where the probe moves, to `gradient`: by coefficient along x, then y, then z. */
+void add_candidate(inout vec3 sum[COEFFICIENTS], inout vec3 gradient[3 * GRADIENT_COEFFICIENTS], vec3 origin,
+                   Candidate chosen, int rays, float step)
 {
-  int lane = int(gl_LocalInvocationID.x);
-  int layer = int(element(probe_layers, int(gl_WorkGroupID.x)).x);
-  int slot_index = first_slot + layer;
-  vec4 slot = element(probe_slots, slot_index);
-  vec3 sum[COEFFICIENTS];
-  vec3 gradient[3 * GRADIENT_COEFFICIENTS];
+  vec3 arriving = light_along(origin, chosen.direction, chosen.distance * 0.9999, 0);
+  if (arriving == vec3(0.0)) {
+    return;
+  }
   float basis[COEFFICIENTS];
-  vec3 basis_gradient[GRADIENT_COEFFICIENTS];
+  vec3 flux = chosen.radiance * (float(rays) * step / chosen.weight) * arriving;
+  sh_basis(chosen.direction, basis);
   for (int c = 0; c < COEFFICIENTS; c++) {
-    sum[c] = vec3(0.0);
+    sum[c] += flux * basis[c];
   }
-  for (int i = 0; i < 3 * GRADIENT_COEFFICIENTS; i++) {
-    gradient[i] = vec3(0.0);
+  float cosine = dot(chosen.direction, chosen.normal);
+  vec3 turn = 3.0 * chosen.direction -
+              chosen.normal / (max(abs(cosine), LEAST_COSINE) * (cosine < 0.0 ? -1.0 : 1.0));
+  flux /= max(chosen.distance, nearest);
+  vec3 basis_gradient[GRADIENT_COEFFICIENTS];
+  sh_basis_gradient(chosen.direction, basis, basis_gradient);
+  for (int c = 0; c < GRADIENT_COEFFICIENTS; c++) {
+    vec3 change = basis[c] * turn - basis_gradient[c];
+    gradient[c] += flux * change.x;
+    gradient[GRADIENT_COEFFICIENTS + c] += flux * change.y;
+    gradient[2 * GRADIENT_COEFFICIENTS + c] += flux * change.z;
   }
-  for (int i = lane; i < 6 * FACE * FACE; i += GROUP) {
-    ivec3 at = ivec3(i % FACE, i / FACE, layer);
-    vec3 radiance = texel_emitter(at);
-    if (radiance != vec3(0.0)) {
-      add_texel(sum, at, radiance);
-    }
-  }
-  uvec3 key = uvec3(uint(slot.w), 0xB5297A4Du, uint(seed));
-  float step;
-  int chosen_count = choose_candidates(slot.xyz, key, lane, step);
-  /* the nearest lamp may get all rays, and few threads have it in their runs */
-  for (int i = lane; i < chosen_count; i += GROUP) {
-    Candidate chosen = candidate(slot.xyz, key, chosen_ones[i].x);
-    vec3 arriving = light_along(slot.xyz, chosen.direction, chosen.distance * 0.9999, 0);
-    if (arriving != vec3(0.0)) {
-      vec3 flux = chosen.radiance * (float(chosen_ones[i].y) * step / chosen.weight) * arriving;
-      sh_basis(chosen.direction, basis);
-      for (int c = 0; c < COEFFICIENTS; c++) {
-        sum[c] += flux * basis[c];
-      }
-      float cosine = dot(chosen.direction, chosen.normal);
-      vec3 turn = 3.0 * chosen.direction -
-                  chosen.normal / (max(abs(cosine), LEAST_COSINE) * (cosine < 0.0 ? -1.0 : 1.0));
-      flux /= max(chosen.distance, nearest);
-      sh_basis_gradient(chosen.direction, basis, basis_gradient);
-      for (int c = 0; c < GRADIENT_COEFFICIENTS; c++) {
-        vec3 change = basis[c] * turn - basis_gradient[c];
-        gradient[c] += flux * change.x;
-        gradient[GRADIENT_COEFFICIENTS + c] += flux * change.y;
-        gradient[2 * GRADIENT_COEFFICIENTS + c] += flux * change.z;
-      }
-    }
-  }
+}
+
+/* Adds what the threads of the group have found and stores it. All of them must call it. */
+void store_sums(vec3 sum[COEFFICIENTS], vec3 gradient[3 * GRADIENT_COEFFICIENTS], int slot_index, int lane)
+{
   for (int c = 0; c < COEFFICIENTS; c++) {
     partial_sums[c * GROUP + lane] = vec4(sum[c], 0.0);
   }
@@ -156,4 +139,36 @@ void main()
       imageStore(emitted_gradient, target, vec4(group_sum(c), 0.0));
     }
   }
+}
+
+void main()
+{
+  int lane = int(gl_LocalInvocationID.x);
+  int layer = int(element(probe_layers, int(gl_WorkGroupID.x)).x);
+  int slot_index = first_slot + layer;
+  vec4 slot = element(probe_slots, slot_index);
+  vec3 sum[COEFFICIENTS];
+  vec3 gradient[3 * GRADIENT_COEFFICIENTS];
+  for (int c = 0; c < COEFFICIENTS; c++) {
+    sum[c] = vec3(0.0);
+  }
+  for (int i = 0; i < 3 * GRADIENT_COEFFICIENTS; i++) {
+    gradient[i] = vec3(0.0);
+  }
+  for (int i = lane; i < 6 * FACE * FACE; i += GROUP) {
+    ivec3 at = ivec3(i % FACE, i / FACE, layer);
+    vec3 radiance = texel_emitter(at);
+    if (radiance != vec3(0.0)) {
+      add_texel(sum, at, radiance);
+    }
+  }
+  uvec3 key = uvec3(uint(slot.w), 0xB5297A4Du, uint(seed));
+  float step;
+  int chosen_count = choose_candidates(slot.xyz, key, lane, step);
+  /* the nearest lamp may get all rays, and few threads have it in their runs */
+  for (int i = lane; i < chosen_count; i += GROUP) {
+    ivec2 chosen = chosen_ones[i];
+    add_candidate(sum, gradient, slot.xyz, candidate(slot.xyz, key, chosen.x), chosen.y, step);
+  }
+  store_sums(sum, gradient, slot_index, lane);
 }

@@ -20,6 +20,40 @@ vec3 irradiance_at(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
 #endif
   return irradiance;
 }
+
+/* Where a ray that came along a direction goes on as a path. */
+struct Bounce {
+  vec3 irradiance; /* direct, of both sides of a sheet by their shares */
+  vec3 origin, normal; /* of the side that the path leaves from */
+  vec3 weight; /* of that side */
+};
+
+Bounce bounce_at(Surface surface, int sheet, vec3 direction, float distance, uvec3 key, int segment, int number)
+{
+  Bounce bounce;
+#ifdef HAS_COUPLING
+  coupling = surface.coupling;
+#endif
+  bounce.normal = surface.normal;
+  bounce.origin = step_off(surface.position, surface.normal, -direction, distance);
+  bounce.weight = vec3(1.0);
+  uvec3 light_key = key + uvec3(0u, 0x1B873593u + uint(segment), 0u);
+  bounce.irradiance = irradiance_at(surface.position, bounce.origin, surface.normal, light_key, number);
+#ifdef HAS_SHEETS
+  vec3 through = share_of_back(sheet);
+  if (through != vec3(0.0)) {
+    vec3 behind = step_off(surface.position, -surface.normal, direction, distance);
+    uvec3 back_key = light_key + uvec3(0u, BACK_STREAM, 0u);
+    bounce.irradiance = (1.0 - through) * bounce.irradiance +
+                        through * irradiance_at(surface.position, behind, -surface.normal, back_key, number);
+    bool crosses = (pcg3d(key + uvec3(uint(number), SIDE_STREAM + uint(segment), 0u)).x & 1u) != 0u;
+    bounce.normal = crosses ? -surface.normal : surface.normal;
+    bounce.origin = crosses ? behind : bounce.origin;
+    bounce.weight = side_weight(through, crosses);
+  }
+#endif
+  return bounce;
+}
 #endif
 
 void main()
@@ -93,29 +127,11 @@ void main()
     end.w = pack_normal(octahedral_encode(surface.normal));
 #if SEGMENTS > 1
     if (segment < SEGMENTS - 1) {
-      normal = surface.normal;
-#ifdef HAS_COUPLING
-      coupling = surface.coupling;
-#endif
-      origin = step_off(surface.position, normal, -direction, hit.distance);
-      uvec3 light_key = key + uvec3(0u, 0x1B873593u + uint(segment), 0u);
-      vec3 irradiance = irradiance_at(surface.position, origin, normal, light_key, number);
-#ifdef HAS_SHEETS
-      through = share_of_back(sheet);
-      if (through != vec3(0.0)) {
-        vec3 behind = step_off(surface.position, -normal, direction, hit.distance);
-        uvec3 back_key = light_key + uvec3(0u, BACK_STREAM, 0u);
-        irradiance = (1.0 - through) * irradiance +
-                     through * irradiance_at(surface.position, behind, -normal, back_key, number);
-        crosses = (pcg3d(key + uvec3(uint(number), SIDE_STREAM + uint(segment), 0u)).x & 1u) != 0u;
-        normal = crosses ? -normal : normal;
-        origin = crosses ? behind : origin;
-      }
-#endif
-      brought += throughput * irradiance * 0.3183098861837907;
-#ifdef HAS_SHEETS
-      throughput *= side_weight(through, crosses);
-#endif
+      Bounce bounce = bounce_at(surface, sheet, direction, hit.distance, key, segment, number);
+      brought += throughput * bounce.irradiance * 0.3183098861837907;
+      throughput *= bounce.weight;
+      normal = bounce.normal;
+      origin = bounce.origin;
     }
 #endif
   }
