@@ -13,7 +13,7 @@ from ..operators.libraries import library_of
 from ..operators.quality import QUALITIES
 from ..operators.stale import EDITED, STALE, changed_parts, state_of
 from ..operators.volume_choice import active_volume, volumes_of
-from ..scene.field_storage import has_moved, stored_details, stored_metadata
+from ..scene.field_storage import has_moved, stored_details, stored_metadata, unreadable
 from .sidebar_panel import SidebarPanel, paragraph
 
 
@@ -102,6 +102,11 @@ def _state(layout, context) -> None:
     volume = active_volume(context)
     metadata = stored_metadata(volume) if volume else None
     if metadata is None:
+        reason = unreadable(volume) if volume else ""
+        if reason:
+            row = layout.row()
+            paragraph(row, context, reason[0].upper() + reason[1:], "ERROR", buttons=1)
+            row.operator(names.CLEAR_BAKE, text="", icon="TRASH")
         if last_failure():
             paragraph(layout, context, last_failure(), "INFO")
         return

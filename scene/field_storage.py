@@ -35,6 +35,7 @@ _ARRAYS = {
     "depth": ("<f4", (DEPTH_EDGE * DEPTH_EDGE, 2)),
     "gradient": ("<f4", (3, -2, 3)),
 }
+_KINDS = {"matrix": bytes, "bands": int, "metadata": str, "details": str, "state": bytes}  # of what panels show
 _SAME_PLACE = 1e-5  # of the box's size: what a transform may change by rounding
 
 
@@ -75,6 +76,8 @@ def load_field(volume_object: bpy.types.Object) -> Field | None:
     text = stored_text(volume_object)
     if text is None:
         return None
+    if reason := unreadable(volume_object):
+        raise InputError(reason)
     grid = _stored_grid(text, volume_object.name)
     arrays = {}
     counts = {-1: text["bands"] ** 2, -2: gradient_bands(text["bands"]) ** 2}
@@ -104,21 +107,39 @@ def stored_text(volume_object: bpy.types.Object) -> bpy.types.Text | None:
     return text if isinstance(text, bpy.types.Text) and _VERSION in text else None
 
 
-def stored_metadata(volume_object: bpy.types.Object) -> dict | None:
-    """What is known about the light of ``volume_object`` without reading it: cheap enough for every redraw."""
+def unreadable(volume_object: bpy.types.Object) -> str:
+    """In one line why the light that is stored for ``volume_object`` cannot be read; empty where it can, and where
+    there is none. Panels rely on it: an exception in them comes with every redraw."""
     text = stored_text(volume_object)
+    if text is None:
+        return ""
+    name, version = volume_object.name, text[_VERSION]
+    if not isinstance(version, int) or version > _FORMAT_VERSION:
+        return f"the light of '{name}' was stored by a newer Gridlight; update it, or bake the volume again"
+    wrong = next((key for key, kind in _KINDS.items() if not isinstance(text.get(key), kind)), "")
+    return f"the light stored for '{name}' is damaged ({wrong}); bake the volume again" if wrong else ""
+
+
+def _readable_text(volume_object: bpy.types.Object) -> bpy.types.Text | None:
+    return None if unreadable(volume_object) else stored_text(volume_object)
+
+
+def stored_metadata(volume_object: bpy.types.Object) -> dict | None:
+    """What is known about the light of ``volume_object`` without reading it: cheap enough for every redraw. None where
+    there is none, or none that can be read."""
+    text = _readable_text(volume_object)
     return json.loads(text["metadata"]) if text is not None else None
 
 
 def stored_details(volume_object: bpy.types.Object) -> dict:
     """The ``details`` that were stored with the light; empty where there is none."""
-    text = stored_text(volume_object)
+    text = _readable_text(volume_object)
     return json.loads(text["details"]) if text is not None else {}
 
 
 def stored_counts(volume_object: bpy.types.Object) -> dict[str, int] | None:
     """Number of probes of the baked grid: total, active, culled, invalid."""
-    text = stored_text(volume_object)
+    text = _readable_text(volume_object)
     if text is None:
         return None
     return state_counts(np.frombuffer(text.get("state", b""), np.uint8))
@@ -126,13 +147,13 @@ def stored_counts(volume_object: bpy.types.Object) -> dict[str, int] | None:
 
 def stored_invalid(volume_object: bpy.types.Object) -> dict[str, int]:
     """Number of invalid probes by reason (core/probe_states.py); empty where there are none, or nobody noted why."""
-    text = stored_text(volume_object)
+    text = _readable_text(volume_object)
     return json.loads(text.get("invalid", "{}")) if text is not None else {}
 
 
 def has_moved(volume_object: bpy.types.Object) -> bool:
     """Whether box or counts of ``volume_object`` are no longer those of its light. Without light: no."""
-    text = stored_text(volume_object)
+    text = _readable_text(volume_object)
     if text is None:
         return False
     grid = _stored_grid(text, volume_object.name)
@@ -142,8 +163,6 @@ def has_moved(volume_object: bpy.types.Object) -> bool:
 
 
 def _stored_grid(text: bpy.types.Text, name: str) -> Grid:
-    if text[_VERSION] > _FORMAT_VERSION:
-        raise InputError(f"the light of '{name}' was stored by a newer Gridlight; update it, or bake the volume again")
     matrix = np.frombuffer(text["matrix"], "<f8")
     if len(matrix) != 16:
         raise InputError(f"the light stored for '{name}' is damaged (matrix); bake the volume again")

@@ -6,11 +6,21 @@ import gridlight
 import numpy as np
 import pytest
 from gridlight.core.error_budget import ErrorGoal
+from gridlight.core.errors import InputError
+from gridlight.core.field import Field
 from gridlight.core.grid import Grid
 from gridlight.core.settings import BakeSettings
 from gridlight.formats import probe_file
 from gridlight.scene import probe_objects
-from gridlight.scene.field_storage import load_field, stored_counts, stored_details, stored_metadata
+from gridlight.scene.field_storage import (
+    has_moved,
+    load_field,
+    store_field,
+    stored_counts,
+    stored_details,
+    stored_metadata,
+    unreadable,
+)
 from gridlight.scene.volumes import create_volume
 
 
@@ -162,6 +172,29 @@ def test_clear_bake_leaves_nothing(room, gpu_context):
     assert len(bpy.data.texts) == 1
     bpy.ops.gridlight.clear_bake()
     assert not bpy.data.texts and load_field(room) is None
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [("gridlight_version", 2, "newer Gridlight"), ("metadata", b"", "damaged"), ("state", "x", "damaged")],
+)
+def test_light_that_cannot_be_read_is_told_and_baked_over(room, gpu_context, key, value, words):
+    """Panels ask at every redraw: a file of a newer Gridlight must not fill the console."""
+    grid = Grid(np.diag([1.6, 1.6, 1.6, 1.0]), (3, 3, 3), "Room")
+    store_field(room, Field.empty(grid, 3), "known")
+    text = room["gridlight_field"]
+    del text[key]
+    text[key] = value
+    assert words in unreadable(room)
+    assert stored_metadata(room) is None and stored_counts(room) is None and not stored_details(room)
+    assert not has_moved(room)
+    with pytest.raises(InputError, match=words):
+        load_field(room)
+    assert bpy.ops.gridlight.check_bake() == {"FINISHED"}
+    with pytest.raises(RuntimeError, match=words):
+        bpy.ops.gridlight.report()
+    assert bpy.ops.gridlight.bake() == {"FINISHED"}
+    assert not unreadable(room) and load_field(room) is not None
 
 
 def test_deleted_and_moved_probes_are_edits(room):
