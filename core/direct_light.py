@@ -162,15 +162,22 @@ def extent(light: Light, points: np.ndarray) -> np.ndarray:
 
 def met(light: Light, points: np.ndarray, directions: np.ndarray, limits: np.ndarray) -> np.ndarray:
     """(N, 3) radiance of ``light`` that rays from ``points`` along ``directions`` (N, 3 each) meet nearer than
-    ``limits`` (N,); the shapes are those that ``sample_light`` samples."""
+    ``limits`` (N,), suns only where these are infinite."""
+    radiance, distance = meeting(light, points, directions)
+    return np.where(((distance < limits) | np.isinf(limits))[:, None], radiance, 0.0)
+
+
+def meeting(light: Light, points: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 3) radiance of ``light`` that such rays meet if nothing stands between, and how far off (N,), infinite for
+    suns; the shapes are those that ``sample_light`` samples."""
     matrix = np.asarray(light.matrix, float)
-    colour = np.asarray(light.color, float)
+    colour, far = np.asarray(light.color, float), np.full(len(points), np.inf)
     if light.kind == "SUN":
         one_minus_cos = 1.0 - np.cos(light.angle / 2)
         if one_minus_cos == 0:
-            return np.zeros((len(points), 3))
-        hit = np.isinf(limits) & (1.0 - directions @ matrix[:3, 2] < one_minus_cos)
-        return np.where(hit[:, None], colour / (np.pi * one_minus_cos * (2.0 - one_minus_cos)), 0.0)
+            return np.zeros((len(points), 3)), far
+        hit = 1.0 - directions @ matrix[:3, 2] < one_minus_cos
+        return np.where(hit[:, None], colour / (np.pi * one_minus_cos * (2.0 - one_minus_cos)), 0.0), far
     to_centre = matrix[:3, 3] - points
     if light.kind == "AREA":
         hit, distance, factor = _met_area(light, to_centre, directions)
@@ -178,14 +185,14 @@ def met(light: Light, points: np.ndarray, directions: np.ndarray, limits: np.nda
         hit, distance = _met_ball(light, to_centre, directions)
         factor = np.full(len(points), 1.0 / (np.pi * light.radius**2))
     else:
-        return np.zeros((len(points), 3))
-    factor = np.where(hit & (distance < limits), factor, 0.0)
+        return np.zeros((len(points), 3)), far
+    factor = np.where(hit, factor, 0.0)
     if light.kind == "SPOT":
         factor *= spot_mask(light, directions)
     factor = factor[:, None] * colour
     if light.profile is not None:
         factor *= light.profile.factor(-directions @ matrix[:3, :3], np.where(hit, distance, 1.0))
-    return factor
+    return factor, np.where(hit, distance, np.inf)
 
 
 def _met_area(light: Light, to_centre: np.ndarray, directions: np.ndarray):

@@ -35,6 +35,7 @@ MOST_REFLECTIONS = 8  # of a ray in a row; what the last one meets reflects in a
 TEXEL_RAYS = 4  # of a texel on a glossy surface
 TEXEL_LOOKS, LEAST_LOOKS = 64, 4  # at lamps, of the same, and
 LOOKS_IN_ALL = 1024  # at each of them together where there are many
+LOOKS_A_RAY = 8  # share the rays of one of them
 PATCH_BLUR = 0.2  # least width α of lobes in which patches see lamps
 # And probes: against how far facets that mirror one way turn from one side of a texel to the other, radians.
 TEXEL_BLUR = 0.4

@@ -16,6 +16,7 @@ from . import direct_light, rays
 from .cubemap import texel_directions
 from .emitters import CANDIDATES
 from .gloss import (
+    LOOKS_A_RAY,
     MOST_REFLECTIONS,
     PATCH_BLUR,
     TEXEL_BLUR,
@@ -34,7 +35,7 @@ from .reference_emitters import ReferenceEmitters
 from .reference_places import pack
 from .reference_scene import ReferenceScene, Surfaces
 from .reference_ways import Middle, Ways, beginning
-from .sampling import keys_of, light_keys, sample_r2, sample_r3, shifted
+from .sampling import WeightedChoice, keys_of, light_keys, sample_r2, sample_r3, shifted
 from .sheets import off_surface
 from .snapshot import DIFFUSE_RAYS, Light
 
@@ -261,29 +262,60 @@ class ReferenceGloss:
         middle = Middle(seen, self.places(seen), origin, glossy % texels, face, self.scene)
         width = np.maximum(middle.places.alpha, TEXEL_BLUR * middle.turn())
         keys = keys_of(nodes[glossy // texels], _TEXEL_STREAM, seed)
-        looks, looked = looks_at(len(self._lamps())), np.zeros((len(glossy), 3))
-        for look in range(looks):
-            looked += self._look(middle, width, keys, (glossy % texels) * looks + look) / looks
+        looked = self._lamps_looked_at(middle, width, keys)
         ray = np.tile(np.arange(TEXEL_RAYS), len(glossy))
         each = np.repeat(np.arange(len(glossy)), TEXEL_RAYS)
         diffuse, ways = self._send(middle.at(each), width[each], keys[each], (glossy[each] % texels) * TEXEL_RAYS + ray)
         return glossy[each], diffuse, ways, glossy, looked
 
-    def _look(self, middle: Middle, width: np.ndarray, keys: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-        """(G, 3) radiance that lamps send to texels by one place in each."""
-        ways, light_keys_ = middle.through(sample_r3(shifted(keys, 0, _PLACE_STREAM, 0), numbers)), light_keys_of(keys)
-        places = self.places(ways)
-        light = self._lamps_in_gloss(places, ways, width, light_keys_, numbers)
-        on = places.reflect(events_of(light_keys_, numbers, 0), sample_r2(light_keys_, numbers).astype(float))
-        far = np.full(len(width), np.inf)
-        left = ways.surface.triangle
-        meets = np.flatnonzero(self._lamps_met(ways.position, on.direction, far, width, left).any(axis=1))
-        some = ways.at(meets)
-        limit = self.scene.closest(beginning(some), on.direction[meets]).distance
-        met = self._lamps_met(some.position, on.direction[meets], limit, width[meets], left[meets])
-        light[meets] += on.mirrored[meets] * met
-        light[middle.hides(ways, light.any(axis=1))] = 0.0
-        return light
+    def _lamps_looked_at(self, middle: Middle, width: np.ndarray, keys: np.ndarray) -> np.ndarray:
+        """(G, 3) radiance that lamps send to texels by places all over them."""
+        looks, sum_ = looks_at(len(self._lamps())), np.zeros_like(middle.origin)
+        for first in range(0, looks, LOOKS_A_RAY):
+            together = min(LOOKS_A_RAY, looks - first)
+            sum_ += self._by_one_look(middle, width, keys, middle.texel * looks + first, together) / looks
+        return sum_
+
+    def _by_one_look(
+        self, middle: Middle, width: np.ndarray, keys: np.ndarray, first: np.ndarray, looks: int
+    ) -> np.ndarray:
+        """(G, 3) sum of what ``looks`` from number ``first`` (G,) on bring; the way of one of them, chosen by what it
+        brings if nothing stands between, is asked for all."""
+        place_keys, light_keys_ = shifted(keys, 0, _PLACE_STREAM, 0), light_keys_of(keys)
+        choice = WeightedChoice(sample_r3(place_keys, first)[:, 2])
+        seen, light = middle.ways.at(np.arange(len(first))), np.zeros(len(first), int)
+        chosen, towards, distance = np.zeros_like(middle.origin), np.zeros_like(middle.origin), np.zeros(len(first))
+        for numbers in (first + look for look in range(looks)):
+            ways = middle.through(sample_r3(place_keys, numbers))
+            for number, *look in self._seen_of_lamps(self.places(ways), ways, width, light_keys_, numbers):
+                taken = np.flatnonzero(choice.takes(np.abs(look[0]).sum(axis=1)))
+                seen.put(taken, ways.at(taken))
+                light[taken] = number
+                for of_chosen, value in zip((chosen, towards, distance), look):
+                    of_chosen[taken] = value[taken]
+        asked = choice.weight > 0
+        asked &= ~middle.hides(seen, asked)
+        result = chosen * np.where(asked, choice.total / np.where(asked, choice.weight, 1.0), 0.0)[:, None]
+        for number, lamp in enumerate(self._lamps()):
+            lit = np.flatnonzero(asked & (light == number))
+            if lamp.casts_shadow:
+                limit = distance[lit] * _SHADOW_END
+                result[lit] *= self._arriving(beginning(seen)[lit], towards[lit], limit, lamp.link_group)
+        return result
+
+    def _seen_of_lamps(self, places: GlossyPlaces, ways: Ways, width: np.ndarray, keys: np.ndarray, numbers):
+        """What a look sees of each lamp if nothing stands between, by a point on it and by a mirrored ray: number of
+        the lamp, radiance (G, 3), direction (G, 3), distance (G,)."""
+        point = ways.position + self.scene.origin
+        on = places.reflect(events_of(keys, numbers, 0), sample_r2(keys, numbers).astype(float))
+        for number, lamp in enumerate(self._lamps()):
+            falls = self._falls_on(lamp.link_group, ways.surface.triangle)[:, None]
+            share = share_of_points(direct_light.extent(lamp, point), width)[:, None]
+            sample = direct_light.sample_light(lamp, point, sample_r2(light_keys(keys, number), numbers).astype(float))
+            radiance = places.lobe(sample.directions, width) * sample.irradiance * share * falls
+            yield number, radiance, sample.directions, sample.distances
+            met, distance = direct_light.meeting(lamp, point, on.direction)
+            yield number, met * on.mirrored * (1 - share) * falls, on.direction, distance
 
     def _send(self, middle: Middle, width: np.ndarray, keys: np.ndarray, numbers: np.ndarray):
         ways = middle.through(sample_r3(shifted(keys, 0, _PLACE_STREAM, 1), numbers))

@@ -7,6 +7,7 @@ from ..core.gloss import (
     ATTEMPTS,
     LEAST_LOOKS,
     LIGHT_STREAM,
+    LOOKS_A_RAY,
     LOOKS_IN_ALL,
     MOST_REFLECTIONS,
     PATCH_BLUR,
@@ -30,6 +31,7 @@ from .create_infos import (
     _sheet_files,
     _sheets,
 )
+from .patch_create_infos import _compaction
 
 _NUMBERS = {
     "ATTEMPTS": ATTEMPTS,
@@ -56,33 +58,60 @@ def gloss_files(defines: dict, rays: bool = True) -> list[str]:
     return ["gloss_lib", *following] if "HAS_GLOSS" in defines else []
 
 
-def texel_reflections_comp(info, defines):
+def _glossy_texels(info, *names: str) -> None:
+    """What glossy_texels_lib reads, and samplers ``names``."""
     info.define("NO_SURFACE", NO_SURFACE)
+    slot = _samplers(info, "triangle_attributes", "gloss_rows", *names)
+    _samplers(info, "geometry", kind="FLOAT_2D_ARRAY", first=slot)
+    _ints(info, "first_layer", "texel_count")
+
+
+def glossy_count_comp(info, defines):
+    _glossy_texels(info)
+    _image(info, 0, "block_counts", pixel="R32F")
+    return _compaction(info, "glossy_texels_lib", "compaction_lib", "compact_count_comp", places=False)
+
+
+def glossy_list_comp(info, defines):
+    _glossy_texels(info, "block_counts")
+    _image(info, 0, "total_out", pixel="R32F")
+    _image(info, 1, "listed", pixel="R32F")
+    return _compaction(info, "glossy_texels_lib", "compaction_lib", "compact_list_comp")
+
+
+def texel_reflections_comp(info, defines):
     info.define("REFLECTIONS", str(TEXEL_RAYS))
-    for name, value in (("LOOKS", TEXEL_LOOKS), ("LEAST_LOOKS", LEAST_LOOKS), ("LOOKS_IN_ALL", LOOKS_IN_ALL)):
+    for name, value in (
+        ("LOOKS", TEXEL_LOOKS),
+        ("LEAST_LOOKS", LEAST_LOOKS),
+        ("LOOKS_IN_ALL", LOOKS_IN_ALL),
+        ("LOOKS_A_RAY", LOOKS_A_RAY),
+    ):
         info.define(name, str(value))
     slot = gloss(info, defines, _emitters(info, defines, _scene(info, defines)))
-    slot = _samplers(info, "lights", "probe_slots", "world_texels", first=slot)
+    slot = _samplers(info, "lights", "probe_slots", "world_texels", "glossy", first=slot)
     slot = _sheets(info, defines, slot)
     _samplers(info, "geometry", kind="FLOAT_2D_ARRAY", first=slot)
     for number, name in enumerate(("hits", "reflected", "carried")):
         _image(info, number, name)
     _image(info, 3, "albedo", layered=True, access="READ+WRITE")
+    _image(info, 4, "entries", pixel="R32F")
     if "HAS_SHEETS" in defines:
-        _image(info, 4, "hit_sheets", pixel="R32F")
-    _ints(info, "first_slot", "first_layer", "first_probe", "light_count", "seed")
-    info.local_group_size(8, 8, 1)
+        _image(info, 5, "hit_sheets", pixel="R32F")
+    _ints(info, "first_slot", "first_layer", "first", "count", "light_count", "seed")
+    info.local_group_size(64, 1, 1)
     files = [
         *_light_files(defines | {"HAS_ALPHA": True}),
         *gloss_files(defines),
         *_sheet_files(defines),
         "texel_ways_lib",
+        "texel_lamps_lib",
     ]
     return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *files, "texel_reflections_comp"]}
 
 
 def texel_mirrored_comp(info, defines):
-    _samplers(info, "ends", "reflected", "carried")
+    _samplers(info, "entries", "ends", "reflected", "carried")
     _image(info, 0, "mirrored")
     _image(info, 1, "seen", pixel="R32F")
     _ints(info, "first_texel", "texel_count")

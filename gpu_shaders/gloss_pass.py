@@ -12,12 +12,13 @@ import gpu
 
 from ..core.gloss import TEXEL_RAYS
 from ..core.steps import Pace, Steps
-from .dispatch import dispatch_linear
+from .dispatch import compaction_groups, compaction_run, dispatch_linear
+from .growing_array import fill_elements
 from .patch_finder import PatchFinder
 from .places import Places
 from .programs import program
 from .scene_textures import SceneTextures
-from .textures import allocate, scratch
+from .textures import allocate, read_number, scratch
 
 _BYTES_PER_TEXEL = 16 * (TEXEL_RAYS + 1)  # of a kept surface, beside what every surface takes
 
@@ -63,23 +64,33 @@ class GlossPass:
             return
         first, count, layer_count = layers
         texels_each = 6 * self._face**2
-        found = _Found(count * texels_each, self._scene.has_sheets)
+        glossy, found = self._glossy(textures, first, count * texels_each)
+        entries = scratch(count * texels_each, "texels", "R32F")
+        fill_elements(entries, 0, count * texels_each, -1.0)
 
         def trace(start: int, number: int) -> None:
-            shader = self._tracer(textures, found)
+            shader = self._tracer(textures, glossy, found)
+            shader.image("entries", entries)
             shader.uniform_sampler("probe_slots", probe_slots)
             shader.uniform_sampler("world_texels", world_texels)
-            where = ("first_slot", first_slot), ("first_layer", first), ("first_probe", start), ("seed", seed)
-            for name, value in where:
+            where = ("first_slot", first_slot), ("first_layer", first), ("first", start), ("count", number)
+            for name, value in (*where, ("seed", seed)):
                 shader.uniform_int(name, (value,))
-            gpu.compute.dispatch(shader, -(-self._face // 8), -(-6 * self._face // 8), number)
+            dispatch_linear(shader, number)
 
-        yield from pace.portions("reflect", count, trace, first=2)
-        ends = patches.bind_ends(Places(found.hits, 1, found.sheets), count * texels_each * TEXEL_RAYS, 0)
+        yield from pace.portions("reflect", found.count, trace, first=1024)
+        ends = entries
+        if found.count:
+            ends = patches.bind_ends(Places(found.hits, 1, found.sheets), found.count * TEXEL_RAYS, 0)
         if "mirrored" not in textures:
             textures["mirrored"] = allocate(layer_count * texels_each * (TEXEL_RAYS + 1), "texels")
         shader = program("texel_mirrored_comp", REFLECTIONS=TEXEL_RAYS)
-        for name, texture in (("ends", ends), ("reflected", found.reflected), ("carried", found.carried)):
+        for name, texture in (
+            ("entries", entries),
+            ("ends", ends),
+            ("reflected", found.reflected),
+            ("carried", found.carried),
+        ):
             shader.uniform_sampler(name, texture)
         shader.image("mirrored", textures["mirrored"])
         shader.image("seen", patches.seen)
@@ -87,13 +98,35 @@ class GlossPass:
         shader.uniform_int("texel_count", (count * texels_each,))
         dispatch_linear(shader, count * texels_each)
 
-    def _tracer(self, textures: dict, found: _Found):
+    def _glossy(self, textures: dict, first_layer: int, texels: int) -> tuple[gpu.types.GPUTexture, _Found]:
+        """The glossy ones of so many ``texels`` from layer ``first_layer`` on, in order, and room for what they see:
+        on processors as on GPUs, threads wait for their neighbours."""
+        groups = compaction_groups(texels)
+        counts, listed = scratch(groups, "texels", "R32F"), scratch(texels, "texels", "R32F")
+        total = gpu.types.GPUTexture((1, 1), format="R32F")
+        for name in ("glossy_count_comp", "glossy_list_comp"):
+            shader = program(name, FACE=self._face, RUN=compaction_run())
+            self._scene.bind(shader, "triangle_attributes", "gloss_rows")
+            shader.uniform_sampler("geometry", textures["geometry"])
+            if name == "glossy_count_comp":
+                shader.image("block_counts", counts)
+            else:
+                shader.uniform_sampler("block_counts", counts)
+                shader.image("total_out", total)
+                shader.image("listed", listed)
+            shader.uniform_int("first_layer", (first_layer,))
+            shader.uniform_int("texel_count", (texels,))
+            gpu.compute.dispatch(shader, groups, 1, 1)
+        return listed, _Found(read_number(total), self._scene.has_sheets)
+
+    def _tracer(self, textures: dict, glossy: gpu.types.GPUTexture, found: _Found):
         scene = self._scene
         shader = program("texel_reflections_comp", FACE=self._face, **scene.path_defines)
         scene.bind_surfaces(shader)
         scene.bind_sheets(shader)
         scene.bind_gloss(shader, lights=True)
         shader.uniform_sampler("geometry", textures["geometry"])
+        shader.uniform_sampler("glossy", glossy)
         shader.image("albedo", textures["albedo"])
         for name in ("hits", "reflected", "carried"):
             shader.image(name, getattr(found, name))
@@ -103,13 +136,11 @@ class GlossPass:
 
 
 class _Found:
-    """What rays of texels found, see texel_reflections_comp.glsl."""
+    """What rays of ``count`` texels found, see texel_reflections_comp.glsl."""
 
-    def __init__(self, texels: int, has_sheets: bool):
-        rays = texels * TEXEL_RAYS
-        self.hits, self.reflected, self.carried = (
-            scratch(rays, "rays"),
-            scratch(rays, "rays"),
-            scratch(texels, "texels"),
-        )
+    def __init__(self, count: int, has_sheets: bool):
+        rays = count * TEXEL_RAYS
+        self.count = count
+        self.hits, self.reflected = scratch(rays, "rays"), scratch(rays, "rays")
+        self.carried = scratch(count, "texels")
         self.sheets = scratch(rays, "rays", "R32F") if has_sheets else None

@@ -93,11 +93,11 @@ def patch_number_comp(info, defines):
     return _compaction(info, *_PENDING_FILES, "compaction_lib", "patch_number_comp")
 
 
-def patch_pending_comp(info, defines):
+def compact_list_comp(info, defines):
     image = _pending(info, defines, "block_counts")
     _image(info, image, "total_out", pixel="R32F")
-    _image(info, image + 1, "pending", pixel="R32F")
-    return _compaction(info, *_PENDING_FILES, "compaction_lib", "patch_pending_comp")
+    _image(info, image + 1, "listed", pixel="R32F")
+    return _compaction(info, *_PENDING_FILES, "compaction_lib", "compact_list_comp")
 
 
 def patch_due_comp(info, defines):

@@ -24,7 +24,7 @@ from .growing_array import GrowingArray, fill_elements
 from .places import Places, find_couplings
 from .programs import program
 from .scene_textures import SceneTextures
-from .textures import allocate_integers, numbers, read, scratch, upload
+from .textures import allocate_integers, numbers, read, read_number, scratch, upload
 
 _FREE, _NOBODY = 0, 0xFFFFFFFF
 _FEW = 1 << 14  # hits: below, room for as many patches is made unasked, and hits are not listed
@@ -177,7 +177,7 @@ class PatchFinder:
             items, item_count = self._pending(bind, items, item_count)
             if item_count == 0:
                 break
-        self.count = self._most = _number_in(self._totals[0])
+        self.count = self._most = read_number(self._totals[0])
         self._choose_points(bind, first_new)
 
     def _claim(self, bind: _Bind, items, item_count: int, variant: int) -> None:
@@ -208,7 +208,7 @@ class PatchFinder:
             self._most += entries  # a hit leads one patch at most
         else:
             per_block = read(counts, compaction_groups(entries), channels=1)
-            self._most = _number_in(self._totals[0]) + int(per_block.sum())
+            self._most = read_number(self._totals[0]) + int(per_block.sum())
         self._reserve(self._most)
         sheets = bind.sheets is not None
         shader = self._compaction("patch_number_comp", bind, items, item_count, leaders=True, HAS_SHEETS=sheets)
@@ -264,12 +264,12 @@ class PatchFinder:
         entries = bind.entries(item_count)
         listed = scratch(entries, "hits", "R32F")
         total = gpu.types.GPUTexture((1, 1), format="R32F")
-        shader = self._compaction("patch_pending_comp", bind, items, item_count)
+        shader = self._compaction("compact_list_comp", bind, items, item_count)
         shader.uniform_sampler("block_counts", counts)
         shader.image("total_out", total)
-        shader.image("pending", listed)
+        shader.image("listed", listed)
         gpu.compute.dispatch(shader, compaction_groups(entries), 1, 1)
-        return listed, _number_in(total)
+        return listed, read_number(total)
 
     def _count_by_block(self, bind: _Bind, items, item_count: int, leaders: bool = False) -> gpu.types.GPUTexture:
         """Of entries to be picked; something that nobody reads where there is but one block."""
@@ -345,9 +345,3 @@ class _Bind:
 
     def entries(self, item_count: int) -> int:
         return self.count if item_count < 0 else item_count
-
-
-def _number_in(texture: gpu.types.GPUTexture) -> int:
-    buffer = texture.read()
-    buffer.dimensions = 1
-    return int(buffer[0])

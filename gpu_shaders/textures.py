@@ -67,6 +67,13 @@ def read(texture: gpu.types.GPUTexture, elements: int, channels: int = 4) -> np.
     return np.frombuffer(buffer, np.float32).reshape(-1, channels)[:elements].copy()
 
 
+def read_number(texture: gpu.types.GPUTexture) -> int:
+    """The whole number in the first element of a small R32F ``texture``. Waits for the GPU."""
+    buffer = texture.read()
+    buffer.dimensions = texture.width * texture.height
+    return int(buffer[0])
+
+
 def wait_for_gpu() -> None:
     """Returns when the GPU has done what it was told so far: commands are carried out in order."""
     mark = gpu.types.GPUTexture((1, 1), format="R32F")

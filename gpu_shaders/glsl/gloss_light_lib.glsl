@@ -22,8 +22,8 @@ float lamp_extent(int light, vec3 point)
   return area / max(dot(to_centre, to_centre), 1.0e-20);
 }
 
-/* Radiance of a lamp that a ray meets nearer than `limit`. */
-vec3 lamp_met(int light, vec3 point, vec3 direction, float limit)
+/* Radiance of a lamp that a ray meets, and how far off; suns are as far as nothing else. */
+vec3 lamp_met(int light, vec3 point, vec3 direction, out float distance)
 {
   vec4 position_kind = element(lights, 6 * light);
   vec4 color_radius = element(lights, 6 * light + 1);
@@ -31,15 +31,16 @@ vec3 lamp_met(int light, vec3 point, vec3 direction, float limit)
   vec4 parameters = element(lights, 6 * light + 5);
   int kind = int(position_kind.w);
   float radius = color_radius.w;
+  distance = NO_HIT;
   if (radius == 0.0 && kind < RECTANGLE) {
     return vec3(0.0);
   }
   if (kind == SUN) {
-    bool meets = limit == NO_HIT && 1.0 - dot(direction, back.xyz) < radius;
+    bool meets = 1.0 - dot(direction, back.xyz) < radius;
     return meets ? color_radius.rgb / (3.141592653589793 * radius * (2.0 - radius)) : vec3(0.0);
   }
   vec3 to_centre = position_kind.xyz - point;
-  float distance, factor = 1.0;
+  float factor = 1.0;
   if (kind >= RECTANGLE) {
     float cosine = dot(direction, back.xyz);
     if (cosine <= 1.0e-6) {
@@ -79,9 +80,6 @@ vec3 lamp_met(int light, vec3 point, vec3 direction, float limit)
       factor *= spot_mask(light, direction, back.xyz, parameters);
     }
   }
-  if (distance >= limit) {
-    return vec3(0.0);
-  }
   vec3 radiance = color_radius.rgb * factor;
 #ifdef HAS_PROFILES
   int profile = int(parameters.w);
@@ -103,37 +101,41 @@ vec3 lamps_met(vec3 point, vec3 direction, float limit, float width)
       continue;
     }
 #endif
-    vec3 radiance = lamp_met(light, point, direction, limit);
-    if (radiance != vec3(0.0)) {
+    float distance;
+    vec3 radiance = lamp_met(light, point, direction, distance);
+    if (distance < limit || limit == NO_HIT) {
       sum += radiance * (1.0 - share_of_points_on(lamp_extent(light, point), width));
     }
   }
   return sum;
 }
 
-/* Radiance that a glossy surface sends to `view` by light of points on lamps: sample `index` of the sequences of
- * `key`. */
+/* Radiance that a glossy surface sends to `view` by light of a point on a lamp, if nothing stands between: sample
+ * `index` of the sequences of `key`. */
+vec3 lamp_in_gloss(int light, Gloss gloss, Surface surface, vec3 view, float width, uvec3 key, int index,
+                   out LightSample light_sample)
+{
+  vec2 u = sample_r2(key + uvec3(0u, 0u, uint(light) * 0x9E3779B9u), index);
+  light_sample = sample_light(light, surface.position, u);
+  return gloss_lobe(gloss, surface, view, light_sample.direction, width) * light_sample.irradiance *
+         share_of_points_on(lamp_extent(light, surface.position), width);
+}
+
+/* The same by all lamps, with their shadows. */
 vec3 lamps_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float width, uvec3 key, int index)
 {
   vec3 sum = vec3(0.0);
   for (int light = 0; light < light_count; light++) {
-    int group = 0;
 #ifdef HAS_LINKS
-    group = group_of_light(light);
-    if (!falls_on(group, lit_role)) {
+    if (!falls_on(group_of_light(light), lit_role)) {
       continue;
     }
 #endif
-    vec2 u = sample_r2(key + uvec3(0u, 0u, uint(light) * 0x9E3779B9u), index);
-    LightSample light_sample = sample_light(light, surface.position, u);
-    vec3 radiance = gloss_lobe(gloss, surface, view, light_sample.direction, width) * light_sample.irradiance *
-                    share_of_points_on(lamp_extent(light, surface.position), width);
-    if (radiance == vec3(0.0)) {
-      continue;
+    LightSample light_sample;
+    vec3 radiance = lamp_in_gloss(light, gloss, surface, view, width, key, index, light_sample);
+    if (radiance != vec3(0.0)) {
+      sum += radiance * light_arriving(light, light_sample, origin);
     }
-    bool shadow = (int(element(lights, 6 * light + 4).w) & 1) != 0;
-    sum += shadow ? radiance * light_along(origin, light_sample.direction, light_sample.distance * 0.9999, group) :
-                    radiance;
   }
   return sum;
 }

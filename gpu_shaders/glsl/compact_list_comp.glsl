@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Lists the hits that are still without a patch, in order; second step of a compaction, see compaction_lib.
+/* Second step of a compaction, see compaction_lib: lists what is selected, in order, and how much that is.
  *
  * Dispatch: one group of 256 threads a block.
  */
@@ -16,9 +16,9 @@ void main()
   }
   place += selected.y;
   for (int i = 0; i < RUN; i++) {
-    int hit = item(first + i);
-    if (is_selected(hit)) {
-      imageStore(pending, element_position(place), vec4(float(hit)));
+    int chosen = item(first + i);
+    if (is_selected(chosen)) {
+      imageStore(listed, element_position(place), vec4(float(chosen)));
       place++;
     }
   }
