@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import math
 import re
+from pathlib import Path
 
 from ..core.errors import InputError
 
@@ -125,6 +126,13 @@ def frames(text: str) -> list[int]:
     if last < first:
         raise argparse.ArgumentTypeError(f"'{text}' is not a range of frames A-B")
     return list(range(first, last + 1))
+
+
+def check_exists(*paths: str | Path) -> None:
+    """Raises InputError for the first of ``paths`` where there is nothing."""
+    for path in paths:
+        if not Path(path).exists():
+            raise InputError(f"{path}: no such file; check the spelling and the folder")
 
 
 def add_pictures(parser) -> None:

@@ -179,9 +179,8 @@ def check(args) -> None:
             probe_file.check_size(grid, args.bands)
     elif args.resolution:
         Grid(np.eye(4), args.resolution)
-    for file in [args.file, *(state for state in args.relight if not is_frame(state))]:
-        if file is not None and not Path(file).exists():
-            raise InputError(f"{file}: no such file")
+    states = [state for state in args.relight if not is_frame(state)]
+    arguments.check_exists(*(states if args.file is None else [args.file, *states]))
 
 
 def is_frame(state: str) -> bool:

@@ -32,7 +32,7 @@ def run(args, reporter, should_stop):
     try:
         points = open(args.points, encoding="utf-8", newline=None)
     except OSError as error:
-        raise InputError(f"cannot read {args.points}: {error.strerror}") from None
+        raise InputError(f"cannot read {args.points}: {error.strerror}; name a CSV file of points") from None
     reporter.phase("eval")
     with points, StagedFolder(output.parent) as folder:
         with open(folder.path(output.name), "w", encoding="utf-8", newline="\n") as table:

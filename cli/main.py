@@ -25,6 +25,7 @@ from pathlib import Path
 
 from ..core.errors import Cancelled, GridlightError, InputError
 from ..formats import staging
+from ..formats.probe_metadata import program_version
 from . import worker
 from .arguments import Parser, join_signed_values
 from .progress import Reporter
@@ -150,6 +151,7 @@ def _commands(argv: list[str], family: Family) -> dict:
 
 def _parser(modules: dict, in_blender: bool, family: Family) -> Parser:
     parser = Parser(prog=family.program, description=family.description)
+    parser.add_argument("--version", action="version", version=f"Gridlight {program_version()}")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", parser_class=Parser)
     for name, module in modules.items():
         sub = subparsers.add_parser(name, help=module.HELP, description=module.HELP)

@@ -17,7 +17,7 @@ from ..core.world_suns import extract_suns
 from ..formats import probe_file, report_errors
 from ..formats.report import write_page
 from ..formats.staging import StagedFolder
-from . import verify_points
+from . import arguments, verify_points
 from .verify_measure import Points, Reference, Row, measure
 
 HELP = "compares a probe file with Cycles panoramas of its scene"
@@ -69,9 +69,7 @@ def check(args) -> None:
     ):
         if not low <= value <= high:
             raise InputError(f"{name} is {value}; it must lie between {low} and {high}")
-    for path in (args.file, args.probes):
-        if not Path(path).exists():
-            raise InputError(f"{path}: no such file")
+    arguments.check_exists(args.file, args.probes)
 
 
 def run(args, reporter, should_stop):

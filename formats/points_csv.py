@@ -7,6 +7,7 @@ import itertools
 
 import numpy as np
 
+from ..core.conventions import MOST_REACH_M
 from ..core.errors import InputError
 
 HEADER_IN = "x,y,z,nx,ny,nz"
@@ -21,7 +22,8 @@ def read_blocks(file, name: str):
     Blank lines are skipped. Normals come back with unit length.
 
     Raises:
-        InputError: naming the line: a wrong header, a row that is not six finite numbers, a normal of length zero.
+        InputError: naming the line: a wrong header, a row that is not six finite numbers, a point too far away, a
+            normal of length zero.
     """
     try:
         header = file.readline().lstrip("\ufeff")
@@ -50,6 +52,12 @@ def _values(rows: list[str], numbers: list[int], name: str) -> np.ndarray:
     if not np.isfinite(values).all():
         bad = int(np.argmin(np.isfinite(values).all(axis=1)))
         raise InputError(f"{name}, line {numbers[bad]}: '{rows[bad][:60]}' holds a value that is not finite")
+    farthest = np.abs(values[:, :3]).max(axis=1)
+    if farthest.max(initial=0.0) > MOST_REACH_M:
+        far = int(np.argmax(farthest))
+        raise InputError(
+            f"{name}, line {numbers[far]}: the point is farther away than {MOST_REACH_M:g} m; bring it nearer"
+        )
     normals = values[:, 3:]
     # Scaled by the largest component first: the squares of tiny or huge numbers leave the range of float64.
     largest = np.abs(normals).max(axis=1)

@@ -129,7 +129,7 @@ def read(path) -> Field:
         with open(path, "rb") as file:
             magic = file.read(4)
     except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror}") from None
+        raise InputError(f"cannot read {path}: {error.strerror}; name a probes.exr that Gridlight wrote") from None
     if magic != b"\x76\x2f\x31\x01":
         raise InputError(f"{path} is not an OpenEXR file; name a probes.exr that Gridlight wrote")
     try:

@@ -46,11 +46,14 @@ class StagedFolder:
                     os.replace(temporary, self.folder / name)
             except OSError as reason:
                 self._discard()
-                raise InputError(f"cannot write {self.folder / name}: {reason.strerror}") from None
+                raise InputError(
+                    f"cannot write {self.folder / name}: {reason.strerror}; move it away or name another folder"
+                ) from None
             return
         self._discard()
         if isinstance(error, OSError) and not isinstance(error, (BrokenPipeError, InterruptedError)):
-            raise InputError(f"cannot write to the folder {self.folder}: {error.strerror or error}") from None
+            reason = error.strerror or error
+            raise InputError(f"cannot write to the folder {self.folder}: {reason}; make room or name another") from None
 
     def path(self, name: str) -> Path:
         """Where to write what will be ``name``."""

@@ -117,6 +117,12 @@ def test_wrong_options_end_in_one_line(run_gridlight, tmp_path, options, words):
     assert not list(tmp_path.iterdir())
 
 
+def test_version_is_the_manifests(run_gridlight, root):
+    done = run_gridlight("--version")
+    assert done.returncode == 0 and done.stdout.startswith("Gridlight ")
+    assert f'version = "{done.stdout.split()[1]}"' in (root / "blender_manifest.toml").read_text()
+
+
 def test_help_names_the_commands(run_gridlight):
     done = run_gridlight("--help")
     assert done.returncode == 0
@@ -233,6 +239,7 @@ def test_eval_accepts_what_spreadsheets_write(run_gridlight, constant_file, tmp_
         ("x,y,z,nx,ny,nz\n0,0,0,0,0,1\nnan,0,0,0,0,1\n", ["line 3", "not finite"]),
         ("x,y,z,nx,ny,nz\n0,0,0,0,0,inf\n", ["line 2", "not finite"]),
         ("x,y,z,nx,ny,nz\n0,0,0,0,0,0\n", ["line 2", "length zero"]),
+        ("x,y,z,nx,ny,nz\n0,0,1,0,0,1\n0,0,1e300,0,0,1\n", ["line 3", "farther away"]),
     ],
 )
 def test_eval_names_the_line_that_is_wrong(run_gridlight, constant_file, tmp_path, content, words):
