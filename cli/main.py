@@ -13,6 +13,7 @@ and optionally ``check(args)``, quick checks that need no Blender, made before o
 
 from __future__ import annotations
 
+import errno
 import importlib
 import importlib.util
 import json
@@ -29,6 +30,8 @@ from ..formats.probe_metadata import program_version
 from . import worker
 from .arguments import Parser, join_signed_values
 from .progress import Reporter
+
+_DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES)  # of a disk or its rights, not of ours
 
 
 @dataclass(frozen=True)
@@ -87,19 +90,36 @@ def _guarded(argv: list[str], in_blender: bool, child: bool, family: Family) -> 
     except GridlightError as error:
         _say(str(error))
         return error.exit_status
-    except BrokenPipeError:
-        # Whoever read our output has enough. Python would complain again when it flushes at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    except BrokenPipeError:  # whoever read our output has enough
+        _drop_output()
         return 0
     except SystemExit as end:  # argparse after --help; Blender must not end for it
         return int(end.code or 0)
     except MemoryError:
         _say("not enough memory for this; use a lower --resolution, --face or --memory")
         return InputError.exit_status
-    except Exception:  # a defect of ours: the one case in which a traceback helps the user, who can send it to us
-        traceback.print_exc()
-        _say("this is a defect of Gridlight; please report it with the lines above")
-        return 1
+    except OSError as error:
+        if error.errno not in _DISK_ERRORS:
+            return _defect()
+        if error.filename is None:
+            _drop_output()
+        what = f"read or write {error.filename}" if error.filename else "write standard output"
+        _say(f"cannot {what}: {error.strerror}; make room, or use another place")
+        return InputError.exit_status
+    except Exception:
+        return _defect()
+
+
+def _defect() -> int:
+    """Of ours: the one case in which a traceback helps the user, who can send it to us."""
+    traceback.print_exc()
+    _say("this is a defect of Gridlight; please report it with the lines above")
+    return 1
+
+
+def _drop_output() -> None:
+    """What cannot be written now: Python would complain again when it flushes at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 
 def _run(argv: list[str], in_blender: bool, child: bool, family: Family) -> int:

@@ -52,8 +52,8 @@ class StagedFolder:
             return
         self._discard()
         if isinstance(error, OSError) and not isinstance(error, (BrokenPipeError, InterruptedError)):
-            reason = error.strerror or error
-            raise InputError(f"cannot write to the folder {self.folder}: {reason}; make room or name another") from None
+            why = error.strerror or error
+            raise InputError(f"cannot write to the folder {self.folder}: {why}; make room or name another") from None
 
     def path(self, name: str) -> Path:
         """Where to write what will be ``name``."""

@@ -145,6 +145,12 @@ def test_info_says_what_the_file_holds(run_gridlight, constant_file):
     assert "Room" in done.stdout and "3 × 4 × 5 = 60" in done.stdout
 
 
+def test_a_full_disk_behind_standard_output_is_one_line(run_gridlight, constant_file):
+    with open("/dev/full", "w") as full:
+        done = run_gridlight("info", constant_file, stdout=full, stderr=subprocess.PIPE, capture_output=False)
+    assert done.returncode == 2 and len(done.stderr.splitlines()) == 1 and "standard output" in done.stderr
+
+
 def test_info_is_quick_and_loads_no_blender(constant_file, root):
     program = (
         "import runpy, sys\nsys.argv = ['gridlight', 'info', sys.argv[1]]\n"
