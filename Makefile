@@ -11,7 +11,7 @@ ARGUMENTS ?=
 help:
 	@awk '/^# /{line = substr($$0, 3)} /^[a-z]+:/{printf "make %-8s %s\n", substr($$1, 1, length($$1) - 1), line} !/^# /{line = ""}' Makefile
 
-# Everything that fits a quarter of an hour.
+# Everything but the nightly ones, 25 minutes on two cores with both Blenders.
 test:
 	@./scripts/test --quick --beside tests/gui $(SERIES) -- tests $(ARGUMENTS)
 
