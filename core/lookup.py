@@ -16,6 +16,7 @@ lookup_lib.glsl and field_lib.glsl.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -74,19 +75,28 @@ def grid_info(grid: Grid) -> np.ndarray:
     return info
 
 
-def lookup_weights(field: Field, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes (N, K) and weights (N, K), summing to 1, that make up the field at ``points`` (N, 3) with ``normals`` (N,
-    3). The first eight are the corners of the point's cell. K is 64 where the corners of some cell see too little."""
-    nodes, weights = trilinear(field.grid, points)
-    weights = weights * _seen(field, nodes, points, normals)
-    lacking = 1.0 - weights.sum(axis=1) / SEEN_ENOUGH
-    hidden = np.flatnonzero(lacking > 0)
-    if len(hidden):
-        around, around_weights = np.repeat(nodes, len(_AROUND) // 8, axis=1), np.zeros((len(nodes), len(_AROUND)))
-        around[hidden], around_weights[hidden] = _around(field, points[hidden], normals[hidden])
-        around_weights *= lacking[:, None]
-        nodes, weights = np.hstack([nodes, around]), np.hstack([weights, around_weights])
-    return nodes, weights / weights.sum(axis=1, keepdims=True)
+@dataclass(frozen=True)
+class Weights:
+    """What makes up the field at N points, of M of which the corners of their cells see too little. Of each point all
+    weights together sum to 1."""
+
+    corners: np.ndarray  # (N, 8) nodes
+    of_corners: np.ndarray  # (N, 8)
+    lacking: np.ndarray  # (M,) points
+    around: np.ndarray  # (M, 56) nodes around their cells
+    of_around: np.ndarray  # (M, 56)
+
+
+def lookup_weights(field: Field, points: np.ndarray, normals: np.ndarray) -> Weights:
+    """For world ``points`` (N, 3) on surfaces with ``normals`` (N, 3)."""
+    corners, weights = trilinear(field.grid, points)
+    weights = weights * _seen(field, corners, points, normals)
+    total = weights.sum(axis=1)
+    lacking = np.flatnonzero(total < SEEN_ENOUGH)
+    around, of_around = _around(field, points[lacking], normals[lacking])
+    of_around *= 1.0 - total[lacking, None] / SEEN_ENOUGH
+    total[lacking] += of_around.sum(axis=1)
+    return Weights(corners, weights / total[:, None], lacking, around, of_around / total[lacking, None])
 
 
 def _seen(field: Field, nodes: np.ndarray, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -172,19 +182,21 @@ def irradiance(field: Field, points: np.ndarray, normals: np.ndarray) -> np.ndar
     gradient = per_cell(field.grid, field.gradient)
     for start in range(0, len(points), _POINTS_AT_ONCE):
         part = slice(start, start + _POINTS_AT_ONCE)
-        nodes, weights = lookup_weights(field, points[part], normals[part])
-        blended = np.zeros((len(nodes), *field.coefficients.shape[1:]))
-        for first in range(0, nodes.shape[1], 8):
+        found = lookup_weights(field, points[part], normals[part])
+        blended = _blended(field, found.corners, found.of_corners)
+        for first in range(0, found.around.shape[1], 8):
             eight = slice(first, first + 8)
-            rows = np.flatnonzero(weights[:, eight].any(axis=1))
-            known = field.coefficients[nodes[rows, eight]].astype(float)
-            blended[rows] += np.einsum("nw,nwkc->nkc", weights[rows, eight], known)
-        corners = weights[:, :8]
-        steps = gradient_steps(field.grid, points[part], corners) * corners[..., None]
-        led = np.einsum("nwa,nwakc->nkc", steps, gradient[nodes[:, :8]])
+            blended[found.lacking] += _blended(field, found.around[:, eight], found.of_around[:, eight])
+        steps = gradient_steps(field.grid, points[part], found.of_corners) * found.of_corners[..., None]
+        led = np.einsum("nwa,nwakc->nkc", steps, gradient[found.corners])
         blended[:, : led.shape[1]] += led
         result[part] = sh.irradiance(blended, normals[part])
     return result
+
+
+def _blended(field: Field, nodes: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """(N, K, 3) coefficients of ``nodes`` (N, 8), by ``weights`` (N, 8)."""
+    return np.einsum("nw,nwkc->nkc", weights, field.coefficients[nodes].astype(float))
 
 
 def inverse_moments(depth: np.ndarray) -> np.ndarray:
