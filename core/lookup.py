@@ -33,8 +33,8 @@ INVALID_WEIGHT = 1e-27  # of probes inside solids, which carry their neighbours'
 # Where the corners of a cell see less of a point than this, the nodes around the cell are asked, too; theirs is the
 # weight of a node one cell away. So a probe that truly sees a point counts more than a nearer one that hardly does, and
 # nothing jumps where they come in.
-SEEN_ENOUGH = 1e-2
-AROUND_WEIGHT = 1e-4
+SEEN_ENOUGH = 2e-2
+AROUND_WEIGHT = 5e-4
 ON_BORDER = 1e-4  # of a cell: what is as near to a border lies on it, or rounding would choose between unseen and seen
 BEYOND = 0.5  # cells past the box that gradients lead on
 # Of the distance to the probe: how far points are moved along their normal before they are tested, so that their own

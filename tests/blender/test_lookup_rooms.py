@@ -17,7 +17,7 @@ from gridlight.scene.read import read_scene
 
 pytestmark = [pytest.mark.any_version, pytest.mark.nightly]
 
-POINTS, SAMPLES, HEIGHT = 30, 16, 32
+POINTS, SAMPLES, HEIGHT = 12, 16, 32
 MOST = {"free": 0.10, "surfaces": 0.12}  # geometric means over the rooms
 OF_TRILINEAR = 0.75  # of what perfect probes give with plain lookup, likewise
 
