@@ -198,6 +198,12 @@ def mean_grazing(alpha: np.ndarray) -> np.ndarray:
     return 1 / (21 + 204 * alpha**1.55)
 
 
+def blurred(alpha: np.ndarray, blur: np.ndarray) -> np.ndarray:
+    """(N,) widths of lobes of ``alpha`` (N,) that are no narrower than ``blur`` (N,), nor wider than lobes are: a
+    ball within a texel turns by more than that."""
+    return np.minimum(np.maximum(alpha, blur), 1.0)
+
+
 def looks_at(lamps: int) -> int:
     """Looks of a texel at each of so many ``lamps``."""
     return min(max(LOOKS_IN_ALL // lamps, LEAST_LOOKS), TEXEL_LOOKS) if lamps else 0

@@ -23,6 +23,7 @@ from .gloss import (
     TEXEL_RAYS,
     GlossyPlaces,
     Reflections,
+    blurred,
     chance_of_mirroring,
     events_of,
     gloss_rows,
@@ -260,7 +261,7 @@ class ReferenceGloss:
         origin = positions[glossy // texels]
         seen = Ways(directions, flat, origin + directions * flat.distance[:, None], zero + 1, zero.copy())
         middle = Middle(seen, self.places(seen), origin, glossy % texels, face, self.scene)
-        width = np.maximum(middle.places.alpha, TEXEL_BLUR * middle.turn())
+        width = blurred(middle.places.alpha, TEXEL_BLUR * middle.turn())
         keys = keys_of(nodes[glossy // texels], _TEXEL_STREAM, seed)
         looked = self._lamps_looked_at(middle, width, keys)
         ray = np.tile(np.arange(TEXEL_RAYS), len(glossy))

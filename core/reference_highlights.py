@@ -17,7 +17,7 @@ from . import direct_light
 from .conventions import LUMINANCE
 from .cubemap import texel_directions
 from .faint_gloss import albedo_towards, coupled, couplings, faint_rows
-from .gloss import PATCH_BLUR, GlossyPlaces
+from .gloss import PATCH_BLUR, GlossyPlaces, blurred
 from .highlights import EMITTER_LOOKS, HIGHLIGHT_BLUR, HIGHLIGHT_STREAM, LAMP_LOOKS, LEAST_SEEN, highlights
 from .patches import EMITTERS, NO_PATCH, Part
 from .reference_emitters import ReferenceEmitters
@@ -90,7 +90,7 @@ class ReferenceHighlights:
         through = self.scene.sheet_shares[self.scene.sheet[triangle]].any(axis=1)
         some = np.flatnonzero((triangle >= 0) & (patch >= 0) & faint & ~through)
         middle, rows, mean = self._middle(surfaces, positions, some, face)
-        width = np.maximum(rows[:, 2, 3], HIGHLIGHT_BLUR * middle.turn())
+        width = blurred(rows[:, 2, 3], HIGHLIGHT_BLUR * middle.turn())
         keys = keys_of(nodes[some // texels], HIGHLIGHT_STREAM, seed)
         seen = -np.einsum("ni,ni->n", middle.ways.direction, middle.ways.surface.normal)
         left = middle.ways.surface.albedo / np.maximum(albedo_towards(rows, mean, seen), 1e-9)

@@ -114,6 +114,12 @@ Reflection reflect_at(Gloss gloss, Surface surface, int triangle, vec3 view, uve
   return reflection;
 }
 
+/* Width of a lobe of `alpha` that is no narrower than `blur`. */
+float blurred(float alpha, float blur)
+{
+  return min(max(alpha, blur), 1.0); /* wider ones are none: a ball within a texel turns by more than that */
+}
+
 /* Radiance sent to the view per unit of radiance and solid angle from `towards`, cosine included, by a lobe of width
  * `alpha`. */
 vec3 gloss_lobe(Gloss gloss, Surface surface, vec3 view, vec3 towards, float alpha)

@@ -39,7 +39,7 @@ vec3 highlights_of_texel(ivec3 at, vec4 slot)
   bool is_flat = normal == element(triangle_attributes, first + 1).xyz &&
                  normal == element(triangle_attributes, first + 2).xyz;
   float turn = is_flat ? 0.7853981633974483 / float(FACE) : turn_over(middle, slot.xyz, at.xy);
-  float width = max(faint.gloss.alpha, HIGHLIGHT_BLUR * turn);
+  float width = blurred(faint.gloss.alpha, HIGHLIGHT_BLUR * turn);
   uvec3 key = uvec3(uint(slot.w), HIGHLIGHT_STREAM, uint(seed));
   Look look = Look(vec3(0.0), 0.0);
   for (int i = 0; i < LOOKS; i++) {

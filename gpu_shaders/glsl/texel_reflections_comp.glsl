@@ -32,7 +32,7 @@ void main()
   Way middle = met_in_middle(triangle, abs(seen.z), slot.xyz, direction);
   middle.surface.albedo *= passed_to(slot.xyz, direction, abs(seen.z) * 0.9999);
   /* so wide that places in the texel do not miss a lamp between them */
-  float width = max(gloss.alpha, TEXEL_BLUR * turn_over(middle, slot.xyz, place));
+  float width = blurred(gloss.alpha, TEXEL_BLUR * turn_over(middle, slot.xyz, place));
   uvec3 key = uvec3(uint(slot.w), 0x165667B1u, uint(seed));
   uvec3 place_key = key + uvec3(0u, 0x2C1B3C6Du, 0u), light_key = key + uvec3(0u, LIGHT_STREAM, 0u);
   vec3 brought = lamps_looked_at(gloss, middle, slot.xyz, place, width, place_key, light_key);

@@ -160,6 +160,26 @@ def test_it_is_nearly_what_following_it_finds(gpu_context):
 
 
 @pytest.mark.any_version
+def test_a_ball_far_off_sends_light(gpu_context):
+    """Normals turn by more than a lobe is wide within one texel that shows a ball; what it sends in all stays."""
+    ball = box((-0.3, -0.3, -0.3), (0.3, 0.3, 0.3))
+    lamp = Light("sun", "SUN", (3.0, 3.0, 3.0), frame((0.3, 0.2, 0.9)), angle=0.01)
+    grid = Grid.from_bounds([-4.0] * 3, [4.0] * 3, (3, 3, 3))
+
+    def seen(**gloss):
+        snapshot = snapshot_of(ball, materials=[Material("metal", (0.63, 0.63, 0.08), **gloss)], lights=[lamp])
+        round_normals = ball / np.linalg.norm(ball, axis=2, keepdims=True)
+        snapshot = replace(snapshot, corner_normals=round_normals.astype(np.float32))
+        field = bake(snapshot, grid, BakeSettings(keep_all=True, face=4)).field
+        return np.delete(field.coefficients[:, 0], 13, axis=0)  # without the one inside
+
+    metal = Gloss((0.63, 0.63, 0.08), (0.7, 0.7, 0.1), 0.7, fixed=True)
+    sent, evenly = seen(faint_gloss=metal), seen()
+    assert (sent >= 0).all()
+    assert 0.6 < sent.sum() / evenly.sum() < 1.6
+
+
+@pytest.mark.any_version
 @pytest.mark.parametrize("gather", [0, 1])
 def test_a_bake_holds_what_paths_find(gpu_context, gather):
     """A room of dark plastic under a lamp, where a lamp overhead counts a sixth less than light from everywhere."""
