@@ -18,8 +18,8 @@ from gridlight.scene.read import read_scene
 pytestmark = [pytest.mark.any_version, pytest.mark.nightly]
 
 POINTS, SAMPLES, HEIGHT = 12, 16, 32
-MOST = {"free": 0.10, "surfaces": 0.12}  # geometric means over the rooms
-OF_TRILINEAR = 0.75  # of what perfect probes give with plain lookup, likewise
+MOST = {"free": 0.055, "surfaces": 0.05}  # geometric means over the rooms
+OF_TRILINEAR = 0.5  # of what perfect probes give with plain lookup, likewise
 
 
 @pytest.mark.gpu
