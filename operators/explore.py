@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 
@@ -154,8 +155,12 @@ class GRIDLIGHT_OT_explore(bpy.types.Operator):
     def _screenshot(self, context) -> None:
         path = actions.screenshot_path()
         region = next(item for item in self._area.regions if item.type == "WINDOW")
-        with context.temp_override(area=self._area, region=region):
+        # A folder that cannot be written must not end the walk half-way.
+        with contextlib.suppress(RuntimeError), context.temp_override(area=self._area, region=region):
             bpy.ops.screen.screenshot_area(filepath=str(path), check_existing=False)
+        if not path.exists():
+            self._overlay.say(f"Cannot write {path}; save the file elsewhere")
+            return
         self._overlay.say(f"Saved {path}")
         self.report({"INFO"}, f"Saved {path}")
 

@@ -9,7 +9,7 @@ import bpy
 import gpu
 import numpy as np
 
-from ..core.errors import GridlightError
+from ..core.errors import GridlightError, InputError
 from ..core.snapshot import World
 from ..core.view import View
 from ..gpu_shaders.viewport_pass import Picture, display
@@ -112,7 +112,7 @@ class GRIDLIGHT_RE_engine(bpy.types.RenderEngine):
         scene = depsgraph.scene_eval
         camera = scene.camera
         if camera is None:
-            raise GridlightError(f"scene '{scene.name}' has no camera")
+            raise InputError(f"scene '{scene.name}' has no camera; add one")
         window = camera.calc_matrix_camera(
             depsgraph,
             x=width,
