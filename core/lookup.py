@@ -89,10 +89,10 @@ class Weights:
 
 def lookup_weights(field: Field, points: np.ndarray, normals: np.ndarray) -> Weights:
     """For world ``points`` (N, 3) on surfaces with ``normals`` (N, 3)."""
-    corners, weights = trilinear(field.grid, points)
-    weights = weights * _seen(field, corners, points, normals)
+    corners, plain = trilinear(field.grid, points)
+    weights = plain * _seen(field, corners, points, normals)
     total = weights.sum(axis=1)
-    lacking = np.flatnonzero(total < SEEN_ENOUGH)
+    lacking = np.flatnonzero((total < SEEN_ENOUGH) & (plain.max(axis=1) < 1.0))  # a node's light is its own
     around, of_around = _around(field, points[lacking], normals[lacking])
     of_around *= 1.0 - total[lacking, None] / SEEN_ENOUGH
     total[lacking] += of_around.sum(axis=1)

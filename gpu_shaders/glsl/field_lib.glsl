@@ -43,13 +43,13 @@ vec3 field_irradiance(vec3 point, vec3 normal)
   sh_cosine_transfer(normal, transfer);
   ivec3 last = ivec3(grid_info[3].xyz) - 1;
   float plain[8], weights[8];
-  float sum = 0.0, around = 0.0;
+  float sum = 0.0, around = 0.0, most = 0.0;
   vec3 value = vec3(0.0), change = vec3(0.0);
   for (int item = 0; item < 8 + 64; item++) {
     if (item == 8) {
       around = AROUND_WEIGHT * (1.0 - sum / SEEN_ENOUGH);
-      if (around <= 0.0) {
-        break;
+      if (around <= 0.0 || most >= 1.0) {
+        break; /* a node's light is its own */
       }
     }
     ivec3 step = lookup_step(item);
@@ -59,6 +59,7 @@ vec3 field_irradiance(vec3 point, vec3 normal)
       vec3 part = mix(1.0 - blend, blend, vec3(step));
       weight = part.x * part.y * part.z;
       plain[item] = weight;
+      most = max(most, weight);
       weights[item] = 0.0;
     }
     else {

@@ -52,9 +52,9 @@ def test_at_a_node_the_field_is_the_nodes():
     np.testing.assert_allclose(found, np.arange(field.grid.count) * np.pi * 0.28209479177387814, rtol=1e-9, atol=1e-9)
 
 
-def test_rounding_does_not_decide_who_is_asked_at_a_node():
-    """A probe that was moved behind a wall does not see its node, nor what is a little off: its neighbours light both,
-    wherever float32 takes the node's place to be, here or far away."""
+def test_rounding_does_not_take_a_node_from_a_probe_that_moved_away():
+    """A probe that was moved behind a wall does not see its node. What float32 makes of the node's place, here or far
+    away, must not hand it over to neighbours that do."""
     field = open_field((4, 4, 4), np.diag([3.0, 3, 3, 1]))
     node = 21
     field.offset[node] = 0.4
@@ -62,9 +62,10 @@ def test_rounding_does_not_decide_who_is_asked_at_a_node():
     field.coefficients[:, 0] = 1.0
     field.coefficients[node, 0] = 9.0
     alone = field.grid.positions()[node]
-    for away in (0.0, 1e-5, -1e-5, 0.02):
+    for away in (0.0, 1e-5, -1e-5):
         found = lookup.irradiance(field, (alone + away)[None], np.array([[0, 0, 1.0]]))
-        np.testing.assert_allclose(found, np.pi * 0.28209479177387814, rtol=1e-3)
+        np.testing.assert_allclose(found, 9 * np.pi * 0.28209479177387814, rtol=1e-6)
+    assert lookup.irradiance(field, (alone + 0.02)[None], np.array([[0, 0, 1.0]])).max() < 2.0
 
 
 def test_linear_light_is_reproduced_in_open_space():
