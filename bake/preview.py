@@ -14,11 +14,12 @@ from ..core.display import standard_view
 from ..core.errors import Cancelled
 from ..core.field import Field
 from ..core.snapshot import SceneSnapshot
+from ..gpu_shaders.dispatch import is_software
 from ..gpu_shaders.preview_pass import PreviewPass
 from ..gpu_shaders.scene_textures import SceneTextures
 
 WIDTH, HEIGHT = 960, 540
-_SAMPLES = 6  # per pixel where one shows
+_SAMPLES, _SOFTWARE_SAMPLES = 6, 3  # per pixel where one shows; in software two are dearer than a bake
 _SHADOW_RAYS = 32  # per pixel: scenes with many lamps get fewer samples
 
 
@@ -40,7 +41,8 @@ def write_previews(
     """
     camera = snapshot.camera or cameras.suggest(field, WIDTH / HEIGHT)
     renderer = PreviewPass(snapshot, scene, field, field.grid.center)
-    samples = int(np.clip(_SHADOW_RAYS // max(len(snapshot.lights), 1), 2, _SAMPLES))
+    most = _SOFTWARE_SAMPLES if is_software() else _SAMPLES
+    samples = int(np.clip(_SHADOW_RAYS // max(len(snapshot.lights), 1), 2, most))
     pictures = renderer.render(camera, WIDTH, HEIGHT, samples, exposure=snapshot.exposure, should_stop=should_stop)
     if pictures is None:
         raise Cancelled("cancelled; nothing was written")

@@ -121,7 +121,7 @@ class ReferenceLight:
         if lit == self.patches.count:
             return
         if lit == 0:
-            self._effort = effort(self.patches.count, self.settings.samples)
+            self._effort = effort(self.patches.count, self.settings.samples, self.settings.face)
         numbers = np.arange(lit, self.patches.count)
         parts = light_parts(self._lamps.count, self.emitters.count > 0)
         sheets = self.patch_sheets

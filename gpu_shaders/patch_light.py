@@ -100,7 +100,7 @@ class PatchLight:
         if self._direct.count == self.count:
             return
         if self._direct.count == 0:
-            self._direct.effort = effort(self.count, self._settings.samples)
+            self._direct.effort = effort(self.count, self._settings.samples, self._settings.face)
         yield from self._direct.add(self.patches.places, self.count)
         self._brightest = self._highlighted = None
 
