@@ -38,8 +38,8 @@ ANGLE = 0.7  # radians: most edge of a patch as a probe sees it
 _MANY_PROBES = 128  # in smaller grids probes share less, and patches are smaller in their sight
 _LEAST_ANGLE = 0.25  # of ANGLE
 _MANY = 44000  # patches whose mean is good with the plain number of rays
+_COARSE = 8  # texels along the edge of a face
 _MOST_EFFORT = 256
-_FINE = 16  # texels an edge of a face, with which rays are what errs most
 ERRORS = (0.28, 1.1, 4.4)  # of one sample, of the light, from which on the next of SAMPLES is taken
 SHADOWED = 0.25  # variance of light that may or may not be shadowed, of its square
 DARK = 0.1  # of the mean light: errors of darker patches are held against this
@@ -61,9 +61,9 @@ _COARSEST = 3  # levels by which patches grow that only rays see
 
 def effort(count: int, samples: int, face: int) -> int:
     """By how much RAYS and SAMPLES are multiplied for a bake of ``count`` patches with the settings ``samples`` and
-    ``face``: what probes see is the mean over patches, so few patches need more of each; but no more than what texels
-    coarser than _FINE leave."""
-    few = 2 ** int(np.clip(1.5 * np.log2(_MANY / max(count, 1)) + min(np.log2(face / _FINE), 0), 0, 4))
+    ``face``: what probes see is the mean over patches, so few patches need more of each; half of that where texels are
+    so coarse that they err more."""
+    few = 2 ** int(np.clip(1.5 * np.log2(_MANY / max(count, 1)) - (face <= _COARSE), 0, 4))
     return min(few * samples, _MOST_EFFORT)
 
 

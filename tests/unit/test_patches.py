@@ -213,7 +213,9 @@ def test_two_runs_number_alike():
 
 
 def test_few_patches_get_more_effort():
-    assert [patches.effort(count, 1, 16) for count in (40_000, 20_000, 9_000, 5_000, 1, 0)] == [1, 2, 8, 16, 16, 16]
+    counts = 40_000, 20_000, 9_000, 5_000, 1, 0
+    assert [patches.effort(count, 1, 16) for count in counts] == [1, 2, 8, 16, 16, 16]
+    assert [patches.effort(count, 1, 8) for count in counts] == [1, 1, 4, 8, 16, 16], "coarse texels err more"
     assert patches.effort(40_000, 4, 32) == 4 and patches.effort(1, 4096, 16) == 256
 
 
