@@ -39,7 +39,7 @@ def _decided(face: int, samples: int, gather: int) -> dict:
 
 
 QUALITIES = {
-    "DRAFT": Quality("Draft", "Quick look while things move", 2.8, _decided(8, 1, 0)),
+    "DRAFT": Quality("Draft", "Quick look while things move", 3.1, _decided(8, 1, 0)),
     "GOOD": Quality("Good", "For most scenes", 2.4, _decided(BakeSettings.face, BakeSettings.samples, 0)),
     "FINAL": Quality("Final", "Finer faces, four times the rays; several times slower", 2.1, _decided(32, 4, 0)),
 }

@@ -72,7 +72,7 @@ def test_refined_they_agree_at_the_surface_itself(browse, run_gridlight, room):
     error = np.abs(found[lit] - expected).max(axis=1) / expected.max(axis=1)
     within = [(error < limit).mean() for limit in (0.02, 0.05)]
     worst = np.quantile(error, 0.999), error.max()
-    assert within[0] > 0.95 and within[1] > 0.98 and worst[0] < 0.25 and worst[1] < 0.4, f"{within}, worst {worst}"
+    assert within[0] > 0.95 and within[1] > 0.98 and worst[0] < 0.25 and worst[1] < 0.5, f"{within}, worst {worst}"
 
 
 def test_the_glb_is_valid(packages, node, room):
