@@ -19,7 +19,7 @@ from ..gpu_shaders.preview_pass import PreviewPass
 from ..gpu_shaders.scene_textures import SceneTextures
 
 WIDTH, HEIGHT = 960, 540
-_SAMPLES, _SOFTWARE_SAMPLES = 6, 3  # per pixel where one shows; in software two are dearer than a bake
+_SAMPLES, _SOFTWARE_SAMPLES = 6, 3  # per pixel where one shows; in software two take as long as a bake
 _SHADOW_RAYS = 32  # per pixel: scenes with many lamps get fewer samples
 
 

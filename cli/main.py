@@ -106,7 +106,7 @@ def _guarded(argv: list[str], in_blender: bool, child: bool, family: Family) -> 
         what = f"read or write {error.filename}" if error.filename else "write standard output"
         _say(f"cannot {what}: {error.strerror}; make room, or use another place")
         return InputError.exit_status
-    except Exception:
+    except Exception:  # whatever nobody expects
         return _defect()
 
 
