@@ -4,17 +4,31 @@
 Standard library only: it is imported inside Blender too.
 """
 
+import contextlib
 import ctypes
+import gc
+import os
 import re
 from pathlib import Path
 
+_TBB_CLEAN_ALL_BUFFERS = 0  # oneapi/tbb/scalable_allocator.h
 MOST_NAMES = 1 << 15  # drivers number objects from 1 upwards and use numbers again
 
 
 def resident_mib() -> float:
-    """MiB of memory in use now. With a software driver this includes what the GPU holds."""
+    """MiB of memory in use now. With a software driver this includes what the GPU holds. What has been freed is given
+    back to the system first: how much of it an allocator keeps for later is a matter of chance."""
+    gc.collect()
+    _give_back()
     status = Path("/proc/self/status").read_text()
     return int(re.search(r"VmRSS:\s+(\d+) kB", status)[1]) / 1024
+
+
+def _give_back() -> None:
+    ctypes.CDLL("libc.so.6").malloc_trim(0)
+    with contextlib.suppress(OSError):  # no such library: nothing was put in malloc's place, as Debian's Blender does
+        tbb = ctypes.CDLL("libtbbmalloc.so.2", mode=os.RTLD_NOLOAD | os.RTLD_NOW)
+        tbb.scalable_allocation_command(_TBB_CLEAN_ALL_BUFFERS, None)
 
 
 def gpu_objects() -> dict[str, int]:

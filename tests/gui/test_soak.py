@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import bpy
+import lit_room
 from harness import in_blender
 from test_sequences import User
 
@@ -23,7 +24,7 @@ GROWTH = 1.05
 
 @in_blender(backends=("opengl",), timeout=60 * MINUTES + 600, nightly_cases=[0])
 def test_hours_of_use_hold_no_more_than_the_first_minute(person, seed):
-    rows = []
+    rows, programs = [], set()
     started = time.monotonic()
     while (seconds := time.monotonic() - started) < 60 * MINUTES or len(rows) < 3:
         user = BusyUser(person, seed)
@@ -34,6 +35,7 @@ def test_hours_of_use_hold_no_more_than_the_first_minute(person, seed):
             yield from user.step()
         yield from user.finish()
         seed += 1
+        write_programs(person, seed, programs)
         if not rows or seconds > FIRST_MINUTE:
             rows.append(measured(seed, time.monotonic() - started))
             write(rows)
@@ -55,24 +57,41 @@ class BusyUser(User):
         return [*(act for name, act in acts.items() if name not in ("undo", "redo")), self.undo, self.redo]
 
     def see_everything(self):
-        """Every kind of action, every quality, several lamps and volumes: what is compiled once has been after it."""
-        scene = bpy.context.scene
+        """Whatever is compiled once has been after it: every quality, with and without gloss, few triangles and more,
+        no lamp and several, one volume and four, and every kind of action."""
         for quality in ("DRAFT", "GOOD", "FINAL"):
-            scene.gridlight.quality = quality
-            for lamps in (0, 3, 1):
-                yield from self.have_lamps(lamps)
-                yield from self.start_bake()
-                yield from self.wait_for_bake()
-            yield from self.live()
-            yield from self.add_light()
-            yield from self.move_lights()
-            yield from self.add_mesh()
-            yield from self.add_volume()
+            for is_glossy in (True, False):  # Blender's own material, or none
+                yield from self.new_file()
+                if not is_glossy:
+                    bpy.data.objects["Cube"].data.materials.clear()
+                yield from self.bake_at(quality)
+                for _ in range(3):
+                    yield from self.see_light()
+                    yield from self.move_lights()
+                    yield from self.add_light()
+                    yield from self.add_mesh()
+                    yield from self.add_volume()
+                yield from self.see_light()
+                yield from self.bake_at(quality)
+        yield from self.new_file()
+        for lamps in (0, 3, 1):
+            yield from self.have_lamps(lamps)
+            yield from self.bake_at("DRAFT")
         for act in self.kinds():
             yield from self.wait_for_bake()
             self.said.append(act.__name__)
             yield from act()
             yield 0.05
+
+    def bake_at(self, quality):
+        bpy.context.scene.gridlight.quality = quality
+        yield from self.start_bake()
+        yield from self.wait_for_bake()
+
+    def see_light(self):
+        """The preview is on until its picture is finished."""
+        yield from self.live()
+        yield from lit_room.drawn(self.person, 120)
 
     def have_lamps(self, count):
         for item in [item for item in bpy.context.scene.objects if item.type == "LIGHT"]:
@@ -104,17 +123,23 @@ class BusyUser(User):
 
 
 def measured(sessions, seconds):
-    gc.collect()
-    objects = len(gc.get_objects())
     path = Path(__file__).parents[1] / "process_size.py"
     spec = importlib.util.spec_from_file_location("process_size", path)
     process_size = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(process_size)
     resident = round(process_size.resident_mib(), 1)
-    counts = {**process_size.gpu_objects(), "objects": objects}
+    counts = {**process_size.gpu_objects(), "objects": len(gc.get_objects())}
     return {"sessions": sessions, "seconds": round(seconds), "MiB": resident, **counts}
 
 
 def write(rows):
     lines = [",".join(rows[0]), *(",".join(map(str, row.values())) for row in rows)]
     Path(os.environ["GRIDLIGHT_PICTURES"], "soak.csv").write_text("\n".join(lines) + "\n")
+
+
+def write_programs(person, sessions, known):
+    """Which programs were compiled for the first time since the last call: after the first session, none should be."""
+    new = {str(key) for key in person.module("gpu_shaders.programs")._programs} - known
+    with Path(os.environ["GRIDLIGHT_PICTURES"], "soak_programs.txt").open("a" if known else "w") as file:
+        file.writelines(f"{sessions} {key}\n" for key in sorted(new))
+    known |= new
