@@ -73,3 +73,17 @@ def test_files_that_are_named_exist(page):
     pattern = rf"`((?:{'|'.join(ROOMS)}|docs|scripts)/[\w/]+\.(?:py|glsl|md|txt))"
     for name in re.findall(pattern, page.read_text()):
         assert "NAME" in name or (ROOT / name).exists(), f"{page.name} names {name}"
+
+
+def test_every_export_format_is_told_of_and_has_a_title():
+    """How far each was tried stands in the table of docs/export.md; "no" means that no engine has run it."""
+    from gridlight.formats.export import TARGETS
+    from gridlight.operators.export_targets import TARGET_ITEMS
+
+    text = (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| ([\w, -]+) \| ([^|]+) \|", text, re.MULTILINE)
+    told = {name: how for names, how in rows for name in names.split(", ")}
+    titles = {name: title for name, title, _description in TARGET_ITEMS}
+    for name, module in TARGETS.items():
+        assert told.get(name, "").startswith("no") != module.RUN_IN_ENGINE and name in told, f"docs/export.md: {name}"
+        assert titles[name] != name, f"{name} has no title in operators/export_targets.py"
