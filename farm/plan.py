@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..cli import arguments, bake
 from ..core.errors import InputError
+from ..formats.staging import StagedFolder
 from . import container
 from .job import VERSION
 from .partition import divide
@@ -111,7 +112,8 @@ def _tell_cost(job: Path, plan: dict, settings, snapshot, grids, reporter, shoul
     for line in table(model, plan):
         reporter.result(line)
     cost = totals(model, plan)
-    (job / "cost.json").write_text(json.dumps(cost, indent=1) + "\n", encoding="utf-8")
+    with StagedFolder(job) as staged:
+        staged.path("cost.json").write_text(json.dumps(cost, indent=1) + "\n", encoding="utf-8")
     return cost
 
 
