@@ -222,7 +222,7 @@ class GRIDLIGHT_OT_clear_bake(bpy.types.Operator):
             return False
         baked = [volume for volume in volumes_of(context.scene) if stored_text(volume)]
         if not baked:
-            cls.poll_message_set("Nothing is baked")
+            cls.poll_message_set("Nothing is baked: there is no light to clear")
         elif all(reasons := [cannot_keep(volume) for volume in baked]):
             cls.poll_message_set(reasons[0])
         else:

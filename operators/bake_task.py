@@ -107,7 +107,9 @@ class BakeTask:
         try:
             snapshot, shown_now = yield from self._read(scene, view_layer)
         except RuntimeError as error:  # Blender could not evaluate the scene at render quality now
-            raise InputError(f"the scene cannot be read: {error}") from error
+            raise InputError(
+                f"the scene cannot be read: {error}; wait until Blender renders no more, then bake again"
+            ) from error
         # Not before: reading evaluates the scene, and a volume that is animated then stands where the frame has it.
         scene, volumes = self._find_scene(), self._find_volumes()
         grids = [grid_of(volume) for volume in volumes]
@@ -177,7 +179,7 @@ class BakeTask:
         """
         scene = _by_uid(bpy.data.scenes, self._scene)
         if scene is None:
-            raise InputError("the scene is gone")
+            raise InputError("the scene was deleted while it was baked; open another one and bake that")
         return scene
 
     def _find_volumes(self) -> list[bpy.types.Object]:
@@ -189,7 +191,9 @@ class BakeTask:
         scene = _by_uid(bpy.data.scenes, self._scene)
         volumes = [_by_uid(scene.objects, uid) for uid in self._volumes] if scene else [None]
         if None in volumes:
-            raise InputError("its volume or scene was deleted")
+            raise InputError(
+                "the volume or its scene was deleted while it was baked; choose another volume and bake that"
+            )
         return volumes
 
     def _store(

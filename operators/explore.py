@@ -60,7 +60,7 @@ class GRIDLIGHT_OT_explore(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         if context.area is None or context.area.type != "VIEW_3D":
-            cls.poll_message_set("Explore mode starts in a 3D viewport")
+            cls.poll_message_set("Explore mode starts in a 3D viewport; press its button there")
             return False
         return in_object_mode(cls, context)
 

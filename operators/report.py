@@ -35,7 +35,7 @@ class GRIDLIGHT_OT_report(bpy.types.Operator):
         try:
             write_report(path, _report(context.scene.name, baked))
         except (GridlightError, OSError) as error:
-            self.report({"ERROR"}, f"the report could not be made: {error}")
+            self.report({"ERROR"}, f"the report cannot be made: {error}")
             return {"CANCELLED"}
         if not bpy.app.background:
             bpy.ops.wm.url_open(url=path.as_uri())

@@ -93,7 +93,9 @@ class GRIDLIGHT_OT_check_bake(bpy.types.Operator):
             if stored_text(volume) and state_of(context.scene, volume) == STALE
         ]
         if stale:
-            self.report({"WARNING"}, f"The light of {', '.join(stale)} belongs to another state of the scene")
+            self.report(
+                {"WARNING"}, f"The light of {', '.join(stale)} is of another state of the scene; bake or relight"
+            )
         else:
             self.report({"INFO"}, "The baked light belongs to this scene")
         return {"FINISHED"}

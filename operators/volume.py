@@ -123,7 +123,7 @@ class GRIDLIGHT_OT_select_volume(bpy.types.Operator):
     def execute(self, context):
         volume = context.view_layer.objects.get(self.volume)
         if not is_volume(volume):
-            self.report({"ERROR"}, f"'{self.volume}' is not a volume of this view layer any more")
+            self.report({"ERROR"}, f"'{self.volume}' has left this view layer; choose another volume")
             return {"CANCELLED"}
         for other in context.selected_objects:
             other.select_set(False)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import sys
 import traceback
 from pathlib import Path
@@ -92,6 +93,18 @@ def _load_fresh():
     yield SETTLE_SECONDS
 
 
+def _check_nothing_is_of_the_checkout() -> None:
+    """What is tested is the installed zip, whole: nothing of it may come from where these tests lie."""
+    checkout = Path(__file__).resolve().parents[2]
+    user = Path(os.environ["BLENDER_USER_RESOURCES"]).resolve()
+    for name, module in list(sys.modules.items()):
+        if name.startswith(EXTENSION) and not Path(module.__file__).resolve().is_relative_to(user):
+            raise RuntimeError(f"{name} is {module.__file__}, not of the installed extension")
+    on_path = [path for path in map(Path, filter(None, sys.path)) if path.resolve() in (checkout, checkout.parent)]
+    if on_path:
+        raise RuntimeError(f"modules are also looked for in {on_path}")
+
+
 def _write(path: Path, value: dict) -> None:
     part = path.with_suffix(".part")
     part.write_text(json.dumps(value))
@@ -108,6 +121,7 @@ def _start() -> None:
     bpy.ops.extensions.package_install_files(filepath=extension, repo="user_default", enable_on_install=True)
     if EXTENSION not in preferences.addons:
         raise RuntimeError(f"{extension} did not install as {EXTENSION}")
+    _check_nothing_is_of_the_checkout()
     bpy.app.timers.register(Server(Path(folder)), first_interval=FIRST_SECONDS, persistent=True)
     _write(Path(folder) / "ready.json", {})
 

@@ -2,6 +2,7 @@
 """Explore mode: every key of the sample, pressed by a person."""
 
 import os
+import shutil
 from pathlib import Path
 
 import bpy
@@ -127,6 +128,26 @@ def test_lights_walls_animation_exposure_probes_and_screenshots(person):
     yield from person.key("Escape")
     assert scene.frame_current == 1 and still.animation_data.action is not None
     preview.show_probes = False
+
+
+@in_blender(backends=("opengl",))
+def test_a_screenshot_that_cannot_be_written_is_told_and_the_walk_goes_on(person):
+    lit_room.build(person)
+    folder = Path(bpy.app.tempdir) / "gone"
+    folder.mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "walk.blend"))
+    shutil.rmtree(folder)
+    folder.touch()  # a folder that is merely gone would be made again
+    explore = yield from enter(person)
+    yield from person.key("F9")
+    yield 0.5
+    said = explore._overlay._text
+    assert said == f"Cannot write {folder / 'walk_0001.png'}; save the file elsewhere", said
+    eye = explore._walker.eye.copy()
+    yield from person.hold("w", 0.4)
+    assert (explore._walker.eye - eye).length > 0.01
+    yield from person.key("Escape")
+    assert not person.module("operators.explore")._running
 
 
 @in_blender(backends=("opengl",))
