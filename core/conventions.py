@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The conventions of docs/architecture.md as code: everything that fixes an order, a sign or a unit.
+"""The conventions of docs/conventions.md as code: everything that fixes an order, a sign or a unit.
 
 World space is Blender's: right-handed, Z up, metres. Light is linear RGB radiance. Spherical harmonics are real and
 orthonormal, without the Condon-Shortley phase, ordered l(l+1)+m.

@@ -8,7 +8,7 @@ number of triangles changed, the old one left and a new one came. All comparison
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -109,18 +109,19 @@ def compare(old: SceneSnapshot, new: SceneSnapshot) -> SceneChanges:
     lights = np.array(
         [i >= len(old.lights) or _differs(old.lights[i], light) for i, light in enumerate(new.lights)], bool
     )
+    of_lights = SceneChanges(
+        lights=lights,
+        lights_removed=max(len(old.lights) - len(new.lights), 0),
+        lights_moved=tuple(_moved_lights(old.lights, new.lights, lights)),
+        world=_differs(old.world, new.world),
+        emission=False,
+        reflectance=False,
+        materials=False,
+        images=False,
+        shape=None,
+    )
     if all(getattr(old, name) is getattr(new, name) for name in _SURFACES):  # a lamp that moves in a large scene
-        return SceneChanges(
-            lights=lights,
-            lights_removed=max(len(old.lights) - len(new.lights), 0),
-            lights_moved=tuple(_moved_lights(old.lights, new.lights, lights)),
-            world=_differs(old.world, new.world),
-            emission=False,
-            reflectance=False,
-            materials=False,
-            images=False,
-            shape=None,
-        )
+        return of_lights
     triangle_map = _match_triangles(old, new)
     common = _common_triangles(triangle_map, len(new.triangles))
     images = _image_map(old.images, new.images)
@@ -132,11 +133,8 @@ def compare(old: SceneSnapshot, new: SceneSnapshot) -> SceneChanges:
     rows_differ = before != after
     images_differ = len(old.images) != len(new.images) or any(i != j for i, j in enumerate(images))
     numbers_differ = triangle_map is None and not np.array_equal(old.material_index, new.material_index)
-    return SceneChanges(
-        lights=lights,
-        lights_removed=max(len(old.lights) - len(new.lights), 0),
-        lights_moved=tuple(_moved_lights(old.lights, new.lights, lights)),
-        world=_differs(old.world, new.world),
+    return replace(
+        of_lights,
         emission=bool(differs["emission"].any()),
         reflectance=bool(differs["reflectance"].any()),
         materials=rows_differ or images_differ or numbers_differ,

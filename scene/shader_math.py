@@ -174,7 +174,7 @@ MATH = {
 
 
 def map_range(value, from_min, from_max, to_min, to_max, interpolation: str, clamp: bool) -> np.ndarray:
-    """Linear, smooth or smoother remapping; stepped falls back to linear in the caller."""
+    """The Map Range node of ``interpolation`` LINEAR, SMOOTHSTEP or SMOOTHERSTEP."""
     share = divide(value - from_min, from_max - from_min)
     if interpolation != "LINEAR":
         share = np.clip(share, 0, 1)

@@ -87,7 +87,10 @@ class NodeEvaluator:
 
     def per_pixel(self, node, scope, function, *names: str) -> Value:
         """``function`` of the named inputs, with a warning where textures with different mappings meet."""
-        values = [self.input(node, name, scope) for name in names]
+        return self.joined(node, function, *(self.input(node, name, scope) for name in names))
+
+    def joined(self, node, function, *values: Value) -> Value:
+        """``function`` of ``values`` that meet in ``node``, with the same warning."""
         if mixed_domains(*values):
             self.loses_pattern = True
             self.notices.append(
@@ -203,13 +206,7 @@ def _mixed(evaluator, node, scope, names, blend_type, clamp_factor, clamp_result
             return second.scaled(first.scale)
         if second.is_constant:
             return first.scaled(second.scale)
-    if mixed_domains(factor, first, second):
-        evaluator.loses_pattern = True
-        evaluator.notices.append(
-            f"{evaluator.owner}: node '{node.name}' joins textures with different mappings; "
-            "only one keeps its pattern, the others are averaged"
-        )
-    return apply(mix, factor, first, second)
+    return evaluator.joined(node, mix, factor, first, second)
 
 
 def _math(evaluator, node, socket, scope):

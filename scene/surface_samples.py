@@ -49,7 +49,7 @@ class SurfaceSamples:
         field of InstanceFacts or ``alpha``; ``property NAME`` of the object.
 
         Raises:
-            Unsupported: not all meshes of the material can answer.
+            Unsupported: no surface has values of such a name. Where single meshes have none, they are black.
         """
         if name not in self._known:
             self._known[name] = self._compute(name).astype(np.float32)

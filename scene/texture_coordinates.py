@@ -25,8 +25,7 @@ def affine_coordinates(evaluator, socket, scope, origin_of) -> tuple[str, np.nda
 
     Args:
         origin_of: called with an output socket, or None for a socket left to its default; names the coordinates that it
-        hands
-            out, or returns None where they are not the ones that are asked for.
+            hands out, or returns None where they are not the ones that are asked for.
 
     Raises:
         Unsupported: the vector is no affine function of such coordinates.
