@@ -174,9 +174,8 @@ class ReferenceGloss:
         point, origin = ways.position, beginning(ways)
         if not self._emitters.count:
             return np.zeros_like(point)
-        choice = sample_r3(shifted(keys, _CHOICE_STREAM, 0, 0), index)[:, 0].astype(float)
+        choice = WeightedChoice(sample_r3(shifted(keys, _CHOICE_STREAM, 0, 0), index)[:, 0])
         best, best_point, best_group = np.zeros_like(point), np.zeros_like(point), np.zeros(len(point), int)
-        best_weight, total = np.zeros(len(point)), np.zeros(len(point))
         for candidate in range(CANDIDATES):
             emitter = self._emitters.sample(sample_r3(keys, index * CANDIDATES + candidate).astype(float))
             offset = emitter.point - point
@@ -188,21 +187,16 @@ class ReferenceGloss:
             share = np.where(self._falls_on(emitter.group, ways.surface.triangle), share, 0.0)
             factor = cosine / (squared * emitter.density) * share
             radiance = emitter.radiance * places.lobe(direction, width) * factor[:, None]
-            weight = radiance.sum(axis=1)
-            total += weight
-            taken = (weight > 0) & (choice * total < weight)
-            left = ~taken & (total > weight)
-            choice[taken] *= total[taken] / weight[taken]
-            choice[left] = (choice[left] * total[left] - weight[left]) / (total[left] - weight[left])
-            best[taken], best_point[taken], best_weight[taken] = radiance[taken], emitter.point[taken], weight[taken]
+            taken = choice.takes(radiance.sum(axis=1))
+            best[taken], best_point[taken] = radiance[taken], emitter.point[taken]
             best_group[taken] = emitter.group[taken]
         result = np.zeros_like(point)
         for group in np.unique(best_group):
-            lit = np.flatnonzero((best_weight > 0) & (best_group == group))
+            lit = np.flatnonzero((choice.weight > 0) & (best_group == group))
             way = best_point[lit] - origin[lit]
             length = np.maximum(np.linalg.norm(way, axis=1), 1e-20)
             arriving = self._arriving(origin[lit], way / length[:, None], length * _SHADOW_END, group)
-            result[lit] = best[lit] * (total[lit] / (best_weight[lit] * CANDIDATES))[:, None] * arriving
+            result[lit] = best[lit] * (choice.total[lit] / (choice.weight[lit] * CANDIDATES))[:, None] * arriving
         return result
 
     def _falls_on(self, group: int | np.ndarray, triangle: np.ndarray) -> np.ndarray:

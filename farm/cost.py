@@ -95,7 +95,7 @@ def table(model: CostModel, plan: dict) -> list[str]:
         workers *= 2
     main, device = model.worker_bytes(plan)
     lines.append(f"memory of a worker: about {main / 2**30:.1f} GiB, and {device / 2**30:.1f} GiB on its GPU")
-    lines.append(f"the job has {len(plan['shards'])} shards of {blocks} blocks; more workers than shards would idle")
+    lines.append(f"shards: {len(plan['shards'])}, of {blocks} blocks in all; more workers than shards would idle")
     return lines
 
 
