@@ -22,6 +22,46 @@ float lamp_extent(int light, vec3 point)
   return area / max(dot(to_centre, to_centre), 1.0e-20);
 }
 
+/* Where a ray meets an area lamp, and the share of its radiance that its spread lets through there; 0 where it does not
+ * meet it. The distance counts only where it does. */
+float area_met(int light, vec3 to_centre, vec3 direction, vec3 back, vec2 spread, out float distance)
+{
+  distance = NO_HIT;
+  float cosine = dot(direction, back);
+  if (cosine <= 1.0e-6) {
+    return 0.0;
+  }
+  distance = dot(to_centre, back) / cosine;
+  vec4 right = element(lights, 6 * light + 2), up = element(lights, 6 * light + 3);
+  vec3 place = direction * distance - to_centre;
+  vec2 at = vec2(dot(place, right.xyz) / max(right.w, 1.0e-20), dot(place, up.xyz) / max(up.w, 1.0e-20));
+  bool is_ellipse = int(element(lights, 6 * light).w) == ELLIPSE;
+  if (distance <= 0.0 || (is_ellipse ? dot(at, at) >= 0.25 : max(abs(at.x), abs(at.y)) >= 0.5)) {
+    return 0.0;
+  }
+  return spread.y > 0.0 ? max((spread.x - sqrt(max(1.0 - cosine * cosine, 0.0)) / cosine) * spread.y, 0.0) : 1.0;
+}
+
+/* The same for a ball, or the disk that faces the point, and the ball's radiance for an intensity of 1. */
+float ball_met(vec3 to_centre, vec3 direction, float radius, bool is_soft, out float distance)
+{
+  distance = NO_HIT;
+  float squared = dot(to_centre, to_centre), along = dot(to_centre, direction), size = radius * radius;
+  if (along <= 0.0) {
+    return 0.0;
+  }
+  if (is_soft || squared <= size) {
+    distance = squared / along;
+    return distance * distance - squared < size ? 0.3183098861837907 / size : 0.0;
+  }
+  float aside = squared - along * along;
+  if (aside >= size) {
+    return 0.0;
+  }
+  distance = along - sqrt(size - aside);
+  return 0.3183098861837907 / size;
+}
+
 /* Radiance of a lamp that a ray meets, and how far off; suns are as far as nothing else. */
 vec3 lamp_met(int light, vec3 point, vec3 direction, out float distance)
 {
@@ -40,45 +80,13 @@ vec3 lamp_met(int light, vec3 point, vec3 direction, out float distance)
     return meets ? color_radius.rgb / (3.141592653589793 * radius * (2.0 - radius)) : vec3(0.0);
   }
   vec3 to_centre = position_kind.xyz - point;
-  float factor = 1.0;
-  if (kind >= RECTANGLE) {
-    float cosine = dot(direction, back.xyz);
-    if (cosine <= 1.0e-6) {
-      return vec3(0.0);
-    }
-    distance = dot(to_centre, back.xyz) / cosine;
-    vec4 right = element(lights, 6 * light + 2), up = element(lights, 6 * light + 3);
-    vec3 place = direction * distance - to_centre;
-    vec2 at = vec2(dot(place, right.xyz) / max(right.w, 1.0e-20), dot(place, up.xyz) / max(up.w, 1.0e-20));
-    if (distance <= 0.0 || (kind == ELLIPSE ? dot(at, at) >= 0.25 : max(abs(at.x), abs(at.y)) >= 0.5)) {
-      return vec3(0.0);
-    }
-    if (parameters.y > 0.0) {
-      factor = max((parameters.x - sqrt(max(1.0 - cosine * cosine, 0.0)) / cosine) * parameters.y, 0.0);
-    }
+  float factor = kind >= RECTANGLE ? area_met(light, to_centre, direction, back.xyz, parameters.xy, distance) :
+                                     ball_met(to_centre, direction, radius, parameters.z != 0.0, distance);
+  if (factor == 0.0) {
+    return vec3(0.0);
   }
-  else {
-    float squared = dot(to_centre, to_centre), along = dot(to_centre, direction), size = radius * radius;
-    if (along <= 0.0) {
-      return vec3(0.0);
-    }
-    if (parameters.z != 0.0 || squared <= size) {
-      distance = squared / along;
-      if (distance * distance - squared >= size) {
-        return vec3(0.0);
-      }
-    }
-    else {
-      float aside = squared - along * along;
-      if (aside >= size) {
-        return vec3(0.0);
-      }
-      distance = along - sqrt(size - aside);
-    }
-    factor = 0.3183098861837907 / size;
-    if (kind == SPOT) {
-      factor *= spot_mask(light, direction, back.xyz, parameters);
-    }
+  if (kind == SPOT) {
+    factor *= spot_mask(light, direction, back.xyz, parameters);
   }
   vec3 radiance = color_radius.rgb * factor;
 #ifdef HAS_PROFILES

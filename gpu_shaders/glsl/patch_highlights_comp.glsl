@@ -9,6 +9,31 @@
  * Dispatch: one thread for each of count patches or texels, from number first_key on; groups of 64.
  */
 
+/* What the end of a ray sends back along it in lobes, beyond what it sends evenly, of its `irradiance`. met: position
+ * and packed normal there; made_of: its mean albedo and the number of its gloss. */
+vec3 sent_beyond(int ray, int end, vec3 irradiance, vec4 met, vec4 made_of, vec3 direction, uvec3 key, int number)
+{
+  Surface surface;
+  surface.position = met.xyz;
+  surface.normal = unpack_normal(met.w);
+  surface.mean_albedo = made_of.rgb;
+  surface.coupling = element(couplings, 2 * end);
+  float leaving = -dot(direction, surface.normal);
+  if (leaving <= 0.0) {
+    return vec3(0.0);
+  }
+#ifdef HAS_LINKS
+  lit_role = role_of_sheet(int(element(sheet_numbers, end).x));
+#endif
+  FaintGloss faint = faint_gloss_of(int(made_of.w));
+  Look look = Look(vec3(0.0), 0.0);
+  uvec3 light_key = key + uvec3(0u, HIGHLIGHT_STREAM, 0u);
+  look_at_part(look, faint, surface, -direction, max(faint.gloss.alpha, PATCH_BLUR), light_key, number);
+  vec3 evenly = max(albedo_at(faint, surface.mean_albedo, leaving), vec3(1.0e-9));
+  vec3 beyond = mean_look(look, 1, element(part_spread, end).x) * 3.141592653589793;
+  return element(reflected, ray).rgb / evenly * irradiance * beyond;
+}
+
 void main()
 {
   int index = LINEAR_THREAD;
@@ -47,25 +72,7 @@ void main()
       continue; /* mirrored on the way */
     }
 #endif
-    Surface surface;
-    surface.position = met.xyz;
-    surface.normal = unpack_normal(met.w);
-    surface.mean_albedo = made_of.rgb;
-    surface.coupling = element(couplings, 2 * end);
-    float leaving = -dot(direction, surface.normal);
-    if (leaving <= 0.0) {
-      continue;
-    }
-#ifdef HAS_LINKS
-    lit_role = role_of_sheet(int(element(sheet_numbers, end).x));
-#endif
-    FaintGloss faint = faint_gloss_of(int(made_of.w));
-    Look look = Look(vec3(0.0), 0.0);
-    uvec3 light_key = key + uvec3(0u, HIGHLIGHT_STREAM, 0u);
-    look_at_part(look, faint, surface, -direction, max(faint.gloss.alpha, PATCH_BLUR), light_key, number);
-    vec3 evenly = max(albedo_at(faint, surface.mean_albedo, leaving), vec3(1.0e-9));
-    vec3 beyond = mean_look(look, 1, element(part_spread, end).x) * 3.141592653589793;
-    sum += element(reflected, ray).rgb / evenly * irradiance * beyond;
+    sum += sent_beyond(ray, end, irradiance, met, made_of, direction, key, number);
   }
   ivec2 place = element_position(index);
   imageStore(highlights, place, imageLoad(highlights, place) + vec4(sum / float(max(counted, 1)), 0.0));

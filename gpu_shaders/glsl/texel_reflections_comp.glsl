@@ -12,6 +12,28 @@
  * Reference: core/reference_gloss.py.
  */
 
+/* Writes where a ray ended, as far as anything diffuse is sent from there. */
+void store_end(Way way, ivec2 place)
+{
+  vec4 end = vec4(0.0, 0.0, 0.0, -1.0);
+  vec3 sent = way.throughput == vec3(0.0) ? vec3(0.0) : way.throughput * way.surface.albedo;
+  int sheet = 0;
+  if (sent != vec3(0.0)) {
+    bool on_surface = false;
+#ifdef HAS_SHEETS
+    sheet = sheet_of_triangle(way.hit.triangle);
+    on_surface = share_of_back(sheet) != vec3(0.0);
+#endif
+    end.xyz = on_surface ? way.surface.position : pull_back(way.surface.position, way.direction, way.hit.distance);
+    end.w = pack_normal(octahedral_encode(way.surface.normal));
+  }
+  imageStore(hits, place, end);
+  imageStore(reflected, place, vec4(sent, 0.0));
+#ifdef HAS_SHEETS
+  imageStore(hit_sheets, place, vec4(float(sheet)));
+#endif
+}
+
 void main()
 {
   int entry = first + LINEAR_THREAD;
@@ -58,24 +80,7 @@ void main()
     go_on(way, reflection, width, false, 2.0 / float(FACE));
     follow_reflections(way, key, ray_number, 1, MOST_REFLECTIONS - 1, PATCH_BLUR, 2.0 / float(FACE));
     brought += way.brought / float(REFLECTIONS);
-    vec4 end = vec4(0.0, 0.0, 0.0, -1.0);
-    vec3 sent = way.throughput == vec3(0.0) ? vec3(0.0) : way.throughput * way.surface.albedo;
-    int sheet = 0;
-    if (sent != vec3(0.0)) {
-      bool on_surface = false;
-#ifdef HAS_SHEETS
-      sheet = sheet_of_triangle(way.hit.triangle);
-      on_surface = share_of_back(sheet) != vec3(0.0);
-#endif
-      end.xyz = on_surface ? way.surface.position : pull_back(way.surface.position, way.direction, way.hit.distance);
-      end.w = pack_normal(octahedral_encode(way.surface.normal));
-    }
-    ivec2 ray_place = element_position(entry * REFLECTIONS + ray);
-    imageStore(hits, ray_place, end);
-    imageStore(reflected, ray_place, vec4(sent, 0.0));
-#ifdef HAS_SHEETS
-    imageStore(hit_sheets, ray_place, vec4(float(sheet)));
-#endif
+    store_end(way, element_position(entry * REFLECTIONS + ray));
   }
   imageStore(carried, element_position(entry), vec4(brought, 0.0));
   imageStore(entries, element_position(texel), vec4(float(entry)));
