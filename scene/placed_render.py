@@ -143,8 +143,7 @@ def _replace_places(tree: bpy.types.NodeTree, wanted: set[str]) -> None:
             output = source.outputs["Fac" if socket.type == "VALUE" else "Vector"]
             if socket.type == "RGBA":
                 output = source.outputs["Color"]
-            for target in targets:
-                tree.links.new(output, target)
+            _feed(tree, output, targets)
         name = _default_place(node)
         vector = node.inputs.get("Vector") if name else None
         if vector is not None and not vector.is_linked:
@@ -159,19 +158,13 @@ def _fix(tree, node, socket, targets) -> None:
         number = fresnel_mean(float(node.inputs["IOR"].default_value))
     else:
         number = layer_weight_mean(float(node.inputs["Blend"].default_value), socket.name)
-    value = tree.nodes.new("ShaderNodeValue")
-    value.outputs[0].default_value = number
-    for target in targets:
-        tree.links.new(value.outputs[0], target)
+    _feed(tree, _number(tree, number), targets)
 
 
 def _middle(tree, socket, targets) -> None:
     """Replace what nobody knows here by the middle of its range."""
     if socket.type == "VALUE":
-        value = tree.nodes.new("ShaderNodeValue")
-        value.outputs[0].default_value = 0.5
-        for target in targets:
-            tree.links.new(value.outputs[0], target)
+        _feed(tree, _number(tree, 0.5), targets)
 
 
 def _open(tree, node, socket, targets) -> None:
@@ -183,9 +176,18 @@ def _open(tree, node, socket, targets) -> None:
         color.outputs[0].default_value = node.inputs["Color"].default_value
         output = color.outputs[0]
     else:
-        value = tree.nodes.new("ShaderNodeValue")
-        value.outputs[0].default_value = 1.0
-        output = value.outputs[0]
+        output = _number(tree, 1.0)
+    _feed(tree, output, targets)
+
+
+def _number(tree: bpy.types.NodeTree, number: float) -> bpy.types.NodeSocket:
+    """The output of a new node that is ``number`` everywhere."""
+    output = tree.nodes.new("ShaderNodeValue").outputs[0]
+    output.default_value = number
+    return output
+
+
+def _feed(tree: bpy.types.NodeTree, output: bpy.types.NodeSocket, targets) -> None:
     for target in targets:
         tree.links.new(output, target)
 
