@@ -14,10 +14,10 @@ from ..formats import probe_file
 from ..formats.export import ExportOptions, export
 from ..formats.file_names import volume_endings
 from ..formats.staging import StagedFolder
-from ..scene.field_storage import load_field, stored_text
+from ..scene.field_storage import load_field
 from . import names
 from .export_targets import PROBE_FILE
-from .volume_choice import volumes_of
+from .volume_choice import has_light, volumes_of
 
 _BESIDE = "//gridlight"
 
@@ -36,10 +36,7 @@ class GRIDLIGHT_OT_export(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if not any(stored_text(volume) for volume in volumes_of(context.scene)):
-            cls.poll_message_set("Nothing is baked; bake a volume first")
-            return False
-        return True
+        return has_light(cls, context)
 
     def invoke(self, context, _event):
         if not (self.directory or _folder(context.scene.gridlight.export)):

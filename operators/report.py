@@ -12,7 +12,7 @@ from ..formats.probe_metadata import program_version
 from ..formats.report import ReportData, VolumeReport, write_report
 from ..scene.field_storage import load_field, stored_counts, stored_details, stored_text
 from . import names
-from .volume_choice import volumes_of
+from .volume_choice import has_light, volumes_of
 
 
 class GRIDLIGHT_OT_report(bpy.types.Operator):
@@ -24,10 +24,7 @@ class GRIDLIGHT_OT_report(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if not any(stored_text(volume) for volume in volumes_of(context.scene)):
-            cls.poll_message_set("Nothing is baked; bake a volume first")
-            return False
-        return True
+        return has_light(cls, context)
 
     def execute(self, context):
         baked = [volume for volume in volumes_of(context.scene) if stored_text(volume)]

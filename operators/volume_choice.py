@@ -7,6 +7,7 @@ import bpy
 
 from ..core.errors import InputError
 from ..core.grid import Grid
+from ..scene.field_storage import stored_text
 from ..scene.volumes import box_of, is_volume, resolution_of
 from .libraries import cannot_keep
 
@@ -78,3 +79,11 @@ def has_volume(operator, context: bpy.types.Context) -> bool:
     elif all(reasons):
         operator.poll_message_set(reasons[0])
     return not all(reasons)
+
+
+def has_light(operator, context: bpy.types.Context) -> bool:
+    """For ``poll``: a volume of the scene holds baked light, or a line that says what to do."""
+    if any(stored_text(volume) for volume in volumes_of(context.scene)):
+        return True
+    operator.poll_message_set("Nothing is baked; bake a volume first")
+    return False

@@ -2,20 +2,11 @@
 """What Explore mode's keys do to a scene, and how spheres are hit, without a window."""
 
 import bpy
-import gridlight
 import numpy as np
 import pytest
 from gridlight.operators import explore_actions
 from gridlight.viewport.picking import sphere_distances
 from mathutils import Vector
-
-
-@pytest.fixture
-def scene():
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    gridlight.register()
-    yield bpy.context.scene
-    gridlight.unregister()
 
 
 def room(name, size, location, color):
