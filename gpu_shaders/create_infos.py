@@ -2,7 +2,8 @@
 """Bindings of every shader: one function per shader, of the shader's name.
 
 Each takes a fresh ``GPUShaderCreateInfo`` and the defines of the variant, declares resources, and returns which files
-make up which stage, libraries first.
+make up which stage, libraries first. Shaders are found by their name in any ``*create_infos.py`` (programs.py); what
+begins with an underscore is no shader but what these modules share.
 """
 
 from __future__ import annotations
