@@ -70,8 +70,9 @@ class ReferenceEmitters:
     def count(self) -> int:
         return len(self._triangle)
 
-    def sample(self, u: np.ndarray) -> EmitterSamples:
-        """The points that ``u`` (N, 3) in [0, 1) pick: a triangle by its share of the power, evenly on it."""
+    def sample(self, u: np.ndarray, viewers: np.ndarray) -> EmitterSamples:
+        """The points that ``u`` (N, 3) in [0, 1) pick: a triangle by its share of the power, evenly on it. They send
+        nothing to ``viewers`` (N or 1, 3) who look at a side that is not there."""
         emitter = np.minimum(np.searchsorted(self._end, u[:, 2], side="right"), self.count - 1)
         root = np.sqrt(u[:, 0])
         barycentric = np.stack([root * (1 - u[:, 1]), root * u[:, 1]], axis=1)
@@ -79,6 +80,7 @@ class ReferenceEmitters:
         point = self.scene.triangles[triangle, 0] + np.einsum("ne,nei->ni", barycentric, self._edge[emitter])
         radiance = self.scene.emission(triangle, barycentric)
         radiance[self.scene.is_hole(triangle, barycentric)] = 0.0
+        radiance[self.scene.is_missing_side(triangle, point - viewers)] = 0.0
         return EmitterSamples(point, self._normal[emitter], radiance, self.density[triangle], self._group(triangle))
 
     def _group(self, triangle: np.ndarray) -> np.ndarray:
@@ -106,7 +108,9 @@ class ReferenceEmitters:
 
     def unshadowed(self, points: np.ndarray, normals: np.ndarray, keys: np.ndarray, index, role) -> np.ndarray:
         """(N, 3) irradiance by candidate ``index`` of the sequences of ``keys`` (N, 3) if nothing stands between."""
-        return self._arrival(self.sample(sample_r3(keys, index).astype(float)), points, normals, role).irradiance
+        return self._arrival(
+            self.sample(sample_r3(keys, index).astype(float), points), points, normals, role
+        ).irradiance
 
     def _arrival(
         self,
@@ -146,7 +150,7 @@ class ReferenceEmitters:
         best = _Arrival(np.zeros_like(points), np.zeros_like(points), np.zeros(len(points), int))
         for candidate in range(CANDIDATES):
             u = sample_r3(keys, np.asarray(index) * CANDIDATES + candidate).astype(float)
-            arrival = self._arrival(self.sample(u), points, normals, role, coupling)
+            arrival = self._arrival(self.sample(u, points), points, normals, role, coupling)
             taken = choice.takes(arrival.irradiance.sum(axis=1))
             for name in ("irradiance", "point", "group"):
                 getattr(best, name)[taken] = getattr(arrival, name)[taken]
@@ -220,7 +224,7 @@ class ReferenceEmitters:
         keys = np.broadcast_to(keys_of(np.array(node), _PROBE_STREAM, settings.seed), (len(index), 3))
         place = sample_r2(keys, index).astype(float)
         jitter = sample_r2(shifted(keys, 1, 0, 0), index)[:, 0].astype(float)
-        emitter = self.sample(np.column_stack([place, (index + jitter) / PROBE_POINTS]))
+        emitter = self.sample(np.column_stack([place, (index + jitter) / PROBE_POINTS]), position)
         offset = emitter.point - position
         distance = np.sqrt(np.maximum(np.einsum("ni,ni->n", offset, offset), 1e-20))
         direction = offset / distance[:, None]

@@ -177,7 +177,7 @@ class ReferenceGloss:
         choice = WeightedChoice(sample_r3(shifted(keys, _CHOICE_STREAM, 0, 0), index)[:, 0])
         best, best_point, best_group = np.zeros_like(point), np.zeros_like(point), np.zeros(len(point), int)
         for candidate in range(CANDIDATES):
-            emitter = self._emitters.sample(sample_r3(keys, index * CANDIDATES + candidate).astype(float))
+            emitter = self._emitters.sample(sample_r3(keys, index * CANDIDATES + candidate).astype(float), point)
             offset = emitter.point - point
             squared = np.maximum(np.einsum("ni,ni->n", offset, offset), 1e-20)
             direction = offset / np.sqrt(squared)[:, None]

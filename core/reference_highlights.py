@@ -159,7 +159,7 @@ class ReferenceHighlights:
         coupling = couplings(places.rows, places.albedo)
         total, weights = np.zeros_like(places.position), np.zeros(len(places.position))
         if part == EMITTERS:
-            emitter = self._emitters.sample(sample_r3(keys, index).astype(float))
+            emitter = self._emitters.sample(sample_r3(keys, index).astype(float), places.position)
             offset = emitter.point - places.position
             squared = np.maximum(np.einsum("ni,ni->n", offset, offset), 1e-20)
             towards = offset / np.sqrt(squared)[:, None]

@@ -16,7 +16,7 @@ from .faint_gloss import albedo_towards, couplings, faint_rows
 from .images import sample_image
 from .light_links import link_roles
 from .sheets import sheet_numbers
-from .snapshot import DIFFUSE_RAYS, DITHERED, FROM_BEHIND, NO_IMAGE, SHADOW_RAYS, SceneSnapshot
+from .snapshot import DIFFUSE_RAYS, DITHERED, FROM_BEHIND, FROM_FRONT, NO_IMAGE, SHADOW_RAYS, SceneSnapshot
 
 # How far below a point surface is looked for, of the step by which rays leave it.
 COUPLING_SEARCH = 32.0
@@ -84,19 +84,21 @@ class ReferenceScene:
 
     def _passed_by(self, kind: int, group: int):
         """Which triangles rays of a kind to emitters of ``group`` do not see along their directions."""
-        unseen, one_sided = (self._unseen_by & kind) > 0, (self._unseen_by & FROM_BEHIND) > 0
+        unseen = (self._unseen_by & kind) > 0
         if 0 < group <= self.links.groups:
             unseen = unseen | ~self.links.blocks[self.role, group]
-        edge = self.triangles[:, 1:] - self.triangles[:, :1]
-        front = np.cross(edge[:, 0], edge[:, 1])
 
         def passes(triangle: np.ndarray, directions: np.ndarray) -> np.ndarray:
-            behind = one_sided[triangle] & (np.einsum("ki,ki->k", front[triangle], directions) > 0)
-            return unseen[triangle] | behind
+            return unseen[triangle] | self.is_missing_side(triangle, directions)
 
-        return (
-            passes if unseen.any() or one_sided.any() else lambda triangle, _directions: np.zeros(len(triangle), bool)
-        )
+        return passes
+
+    def is_missing_side(self, triangle: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """(K,) bool: is the side of ``triangle`` (K,) not there that looks against ``directions`` (K, 3)?"""
+        edge = self.triangles[triangle, 1:] - self.triangles[triangle, :1]
+        along = np.einsum("ki,ki->k", np.cross(edge[:, 0], edge[:, 1]), directions)
+        sides = np.where(along > 0, FROM_BEHIND, np.where(along < 0, FROM_FRONT, 0))
+        return (self._unseen_by[triangle] & sides) > 0
 
     def _hole_test(self, kind: int, group: int = 0):
         """What rays of a kind pass through on their way to emitters of ``group``; None for nothing."""

@@ -18,7 +18,8 @@ from .light_links import UNLINKED, Links
 from .light_profiles import LightProfile
 
 NO_IMAGE = -1
-SHADOW_RAYS, DIFFUSE_RAYS, FROM_BEHIND = 1, 2, 4  # rays that may not see a surface: of a kind, or all from behind
+# Rays that may not see a surface: of a kind, or all from one side.
+SHADOW_RAYS, DIFFUSE_RAYS, FROM_BEHIND, FROM_FRONT, CAMERA_RAYS = 1, 2, 4, 8, 16
 DITHERED = 2.0  # an ``alpha_threshold`` above what alpha can be: every place has one of its own, by chance
 
 
@@ -63,7 +64,7 @@ class Material:
     transmitted: tuple[float, float, float] = (0.0, 0.0, 0.0)
     gloss: Gloss | None = None
     faint_gloss: Gloss | None = None
-    unseen_by: int = 0  # sum of SHADOW_RAYS, DIFFUSE_RAYS and FROM_BEHIND: for these the surface is not there
+    unseen_by: int = 0  # sum of SHADOW_RAYS, DIFFUSE_RAYS and so on: for these the surface is not there
     links: Links = UNLINKED  # which emitters' light falls on it, and passes it
     backface_culling: bool = False  # stated only; light transport treats every surface as two-sided, like Cycles
 

@@ -180,7 +180,7 @@ class SceneTextures:
         rows[:, 0, 3] = self.hierarchy.leaf_end[at]
         roles = self._links.of_surface[material]
         # Bits, see ray_lib.
-        rows[:, 1, 3] = clips[material] + 2 * unseen[material] + 16 * tinted[material] + 32 * roles
+        rows[:, 1, 3] = clips[material] + 2 * unseen[material] + 64 * tinted[material] + 128 * roles
         rows[:, 2, 3] = sheet_of_material[material]
         attributes = _kept_attributes if len(corners) == len(order) else _attributes
         of_surface = snapshot.corner_normals, snapshot.corner_uvs, snapshot.object_index

@@ -3,8 +3,8 @@
 
 The settings remove everything by which Cycles trades truth for speed: clamping, light thresholds, filters wider than a
 pixel, adaptive sampling, denoising, switched-off caustics. Light objects are hidden from the camera because probes hold
-the light of surfaces and of the world only; of other objects it sees those that diffuse rays see, because what probes
-light is diffuse.
+the light of surfaces and of the world only; of other objects it sees those that diffuse rays see, and what materials
+show those rays, because what probes light is diffuse.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from mathutils import Euler
 
 from ..core.panorama import panorama_coordinates, panorama_directions, panorama_solid_angles
 from ..core.snapshot import Light
+from .camera_answers import as_to_diffuse_rays
 from .evaluation import rendered_objects
 from .temporary import render_pixels, scene_copy
 
@@ -65,7 +66,7 @@ def render_panoramas(
     """
     positions = np.asarray(positions, float).reshape(-1, 3)
     panoramas = np.empty((len(positions), height, width, 3), np.float32)
-    with scene_copy(scene, frame) as copy, _seen_as_by_diffuse_rays():
+    with scene_copy(scene, frame) as copy, _seen_as_by_diffuse_rays(), as_to_diffuse_rays():
         positions = positions - _brought_near(copy, positions)
         unbiased_settings(copy, samples, bounces)
         copy.render.resolution_x, copy.render.resolution_y = width, height
@@ -208,10 +209,16 @@ def _seen_as_by_diffuse_rays() -> Iterator[None]:
     instances of."""
     wanted = {item: item.type != "LIGHT" and item.visible_diffuse for item in bpy.data.objects}
     changed = [item for item, seen in wanted.items() if item.visible_camera != seen]
+    worlds = [world.cycles_visibility for world in bpy.data.worlds]
+    worlds = [rays for rays in worlds if rays.camera != rays.diffuse]
     try:
         for item in changed:
             item.visible_camera = wanted[item]
+        for rays in worlds:
+            rays.camera = not rays.camera
         yield
     finally:
         for item in changed:
             item.visible_camera = not wanted[item]
+        for rays in worlds:
+            rays.camera = not rays.camera

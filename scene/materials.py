@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Material datablocks to ``core.snapshot.Material``: one diffuse, emitting, possibly perforated surface each.
+"""Material datablocks to ``core.snapshot.Material``: one diffuse, emitting, possibly perforated surface each, or
+several where not everybody sees the same.
 
-``surface_shaders`` says what each kind of shader becomes. Here the result is laid out for the bake: one texture mapping
-per material (the base colour's, else the opacity's, else the emission's) and at most two textures.
+``surface_shaders`` says what each kind of shader becomes, ``appearances`` who sees it. Here the result is laid out for
+the bake: one texture mapping per material (the base colour's, else the opacity's, else the emission's) and at most two
+textures.
 """
 
 from __future__ import annotations
@@ -14,16 +16,13 @@ import numpy as np
 
 from ..core.gloss import Gloss
 from ..core.light_links import UNLINKED, Links
-from ..core.snapshot import DIFFUSE_RAYS, DITHERED, FROM_BEHIND, NO_IMAGE, Material
+from ..core.snapshot import DIFFUSE_RAYS, DITHERED, NO_IMAGE, Material
+from .appearances import Appearance, AppearanceReader
 from .images import ImageTable
-from .node_links import Unsupported, active_output, find_socket
 from .notices import Notices
-from .procedurals import sampler_of
-from .shader_nodes import NodeEvaluator
 from .shader_values import ONE, ZERO, Domain, Value, add, apply, complement, constant, multiply
 from .surface_parts import SurfaceParts
-from .surface_shaders import DEFAULT_GREY, HOLE, WHITE, Closure, evaluate_shader
-from .surface_values import SurfaceEvaluator
+from .surface_shaders import DEFAULT_GREY, WHITE, Closure
 
 _LEAST_OPACITY = 1e-3  # less is no surface, and what misses less than this of 1 is solid
 
@@ -48,29 +47,40 @@ class MaterialTable:
         self.domains: list[Domain] = []  # the texture mapping of each material, to be applied to its corners' UVs
         self._images = images
         self._notices = notices
-        self._surfaces = surfaces
+        self._appearances = AppearanceReader(images, notices, surfaces)
         self._indices: dict[tuple[int, Look], int] = {}
+        self._coats: dict[int, list[int]] = {}
+
+    def coats(self, index: int) -> list[int]:
+        """Rows that the triangles of a material all show, each to others: its own row ``index``, and what it looks like
+        from behind or to shadow rays where that is something else."""
+        return self._coats.get(index, [index])
 
     def index(self, material: bpy.types.Material | None, look: Look = PLAIN) -> int:
-        """Row of ``material`` on objects of that ``look``; None is Blender's default grey surface."""
+        """Row of ``material`` on objects of that ``look``; None is Blender's default grey surface. See ``coats``."""
         key = (material.as_pointer() if material is not None else 0, look)
         if key not in self._indices and look != PLAIN:
-            own = self.index(material)
-            row = self.materials[own]
-            self._indices[key] = len(self.materials)
+            own = self.coats(self.index(material))
+            self._start(key, len(own))
             factor = 0.0 if look.unseen_by & DIFFUSE_RAYS else look.intensity  # what no ray sees lights nothing
-            emission = _three(value * factor for value in row.emission)
-            unseen_by = row.unseen_by | look.unseen_by
-            self.materials.append(replace(row, emission=emission, unseen_by=unseen_by, links=look.links))
-            self.domains.append(self.domains[own])
+            for row, domain in [(self.materials[index], self.domains[index]) for index in own]:
+                emission = _three(value * factor for value in row.emission)
+                unseen_by = row.unseen_by | look.unseen_by
+                self.materials.append(replace(row, emission=emission, unseen_by=unseen_by, links=look.links))
+                self.domains.append(domain)
         elif key not in self._indices:
-            self._indices[key] = len(self.materials)
-            if material is None:
-                self._append("", Closure(DEFAULT_GREY), False)
-            else:
-                culls = bool(material.use_backface_culling)
-                self._append(material.name, self._closure(material), culls)
+            appearances = [Appearance(Closure(DEFAULT_GREY))] if material is None else self._appearances.of(material)
+            self._start(key, len(appearances))
+            culls = material is not None and bool(material.use_backface_culling)
+            for appearance in appearances:
+                self._append("" if material is None else material.name, appearance, culls)
         return self._indices[key]
+
+    def _start(self, key: tuple[int, Look], count: int) -> None:
+        """The next ``count`` rows are those of ``key``."""
+        first = self._indices[key] = len(self.materials)
+        if count > 1:
+            self._coats[first] = list(range(first, first + count))
 
     def is_hole(self, index: int) -> bool:
         """Whether nothing of the surface is left: light passes everywhere."""
@@ -84,61 +94,8 @@ class MaterialTable:
         images = material.base_image, material.emission_image, material.alpha_image, material.tint_image
         return max(images) != NO_IMAGE
 
-    def _closure(self, material: bpy.types.Material) -> Closure:
-        if material.node_tree is None or not material.use_nodes:
-            return Closure(constant(material.diffuse_color[:3]), constant(1.0))  # type: ignore[index]
-        output = active_output(material.node_tree, "ShaderNodeOutputMaterial")
-        if output is None:
-            self._notices.group("materials without an output node are black", material.name)
-            return Closure()
-        surface, volume = (find_socket(output.inputs, name) for name in ("Surface", "Volume"))
-        if volume.is_linked:
-            self._notices.group("volume shaders are not supported", material.name)
-            if not surface.is_linked:
-                return HOLE
-        try:
-            return self._evaluated(material, surface)
-        except Unsupported as reason:
-            self._notices.append(f"material '{material.name}': {reason}; default grey is used")
-            return Closure(DEFAULT_GREY)
-
-    def _evaluated(self, material: bpy.types.Material, surface: bpy.types.NodeSocket) -> Closure:
-        """The closure at ``surface``: on UV maps where they can carry its pattern, else on an atlas of its own.
-
-        Raises:
-            Unsupported: see ``evaluate_shader``.
-        """
-        owner = f"material '{material.name}'"
-        notices = Notices()
-        evaluator = NodeEvaluator(owner, self._images, notices, material.name, sampler_of(material))
-        closure = evaluate_shader(evaluator, surface)
-        placed = {
-            value.domain
-            for value in (closure.diffuse, closure.through, closure.opacity, closure.emission, closure.tint)
-            if not value.is_constant
-        }
-        samples = None
-        if evaluator.loses_pattern or len(placed) > 1:
-            samples = self._surfaces.samples(material) if self._surfaces is not None else None
-        if samples is not None:
-            notices = Notices()
-            closure = evaluate_shader(
-                SurfaceEvaluator(owner, self._images, notices, material.name, material, samples), surface
-            )
-        self._notices.extend(notices)
-        return self._from_both_sides(closure, evaluator, surface) if evaluator.asks_side else closure
-
-    def _from_both_sides(self, front: Closure, evaluator: NodeEvaluator, surface: bpy.types.NodeSocket) -> Closure:
-        """``front`` with what is known of the back: that nothing is there."""
-        behind = NodeEvaluator(evaluator.owner, self._images, Notices(), evaluator.owner_name, evaluator.sample)
-        behind.behind = True
-        back = evaluate_shader(behind, surface)
-        if back.opacity.is_zero() and back.emission.is_zero() and front.emission.is_zero():
-            return replace(front, one_sided=True)
-        self._notices.group("surfaces show their front on both sides, whatever Backfacing asks", evaluator.owner_name)
-        return front
-
-    def _append(self, name: str, closure: Closure, backface_culling: bool) -> None:
+    def _append(self, name: str, appearance: Appearance, backface_culling: bool) -> None:
+        closure = appearance.closure
         sent_back, transmitted = self._sent_back(name, closure)
         opacity, tint = _solid_where_opaque(closure.opacity), _white_where_clear(closure.tint)
         if tint is not WHITE and sent_back.is_zero() and closure.emission.is_zero():
@@ -181,7 +138,7 @@ class MaterialTable:
                 tint_image=NO_IMAGE if tint.is_constant else self._add(f"{name} tint", tint, None),
                 transmitted=transmitted,
                 **self._gloss(name, closure, sent_back, any(transmitted)),
-                unseen_by=FROM_BEHIND if closure.one_sided else 0,
+                unseen_by=appearance.unseen_by,
                 backface_culling=backface_culling,
             )
         )

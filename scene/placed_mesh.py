@@ -22,9 +22,10 @@ class PlacedMesh:
     mesh: MeshArrays
     rows: np.ndarray  # (M,) int32 rows of the table of materials
     domains: list[Domain | None]  # of each slot: where its textures lie; None where it has none
-    holes: np.ndarray  # (M,) bool: nothing is there
+    holes: np.ndarray  # (M,) bool: nothing is there, and the row means nothing
     atlases: list[AtlasUVs]
     matrices: np.ndarray  # (I, 4, 4) float64
+    first_object: int  # number of the first instance
 
 
 _MOST_KEPT = 1 << 20  # triangles: of more it takes too long to follow one that moves whatever is kept
@@ -35,20 +36,18 @@ def joined_surface(placed: list[PlacedMesh]) -> tuple[dict[str, np.ndarray], lis
     """The arrays of ``SceneSnapshot`` that describe surface, by name, and (number in ``placed``, slot) of textures
     whose UV map the mesh does not have: one point of them shows all over."""
     parts, without_uvs = [], []
-    objects = 0
     keeps = sum(len(group.mesh.triangles) * len(group.matrices) for group in placed) <= _MOST_KEPT
     for index, group in enumerate(placed):
         if keeps and index == len(_kept_surfaces):
             _kept_surfaces.append(Kept(_world_surface, last=1))
-        part, missing = (_kept_surfaces[index] if keeps else _world_surface)(group, objects)
-        objects += len(group.matrices)
+        part, missing = (_kept_surfaces[index] if keeps else _world_surface)(group)
         without_uvs += [(index, slot) for slot in missing]
         if part is not None:
             parts.append(part)
     return _joined(parts), without_uvs
 
 
-def _world_surface(group: PlacedMesh, first_object: int) -> tuple[dict[str, np.ndarray] | None, list[int]]:
+def _world_surface(group: PlacedMesh) -> tuple[dict[str, np.ndarray] | None, list[int]]:
     """World triangles of ``group`` with their per-triangle arrays, None where nothing is left; slots without UVs."""
     mesh, count = group.mesh, len(group.matrices)
     slots = np.clip(mesh.slots, 0, len(group.rows) - 1)
@@ -70,7 +69,7 @@ def _world_surface(group: PlacedMesh, first_object: int) -> tuple[dict[str, np.n
         "corner_normals": world.corner_normals,
         "corner_uvs": world.corner_uvs,
         "material_index": np.tile(group.rows[slots], count),
-        "object_index": np.repeat(np.arange(first_object, first_object + count, dtype=np.int32), len(slots)),
+        "object_index": np.repeat(group.first_object + np.arange(count, dtype=np.int32), len(slots)),
     }, missing
 
 

@@ -15,7 +15,7 @@ from .albedos import fresnel_mean
 from .cycles_reference import unbiased_settings
 from .flat_render import exposed_in_groups, show_alone
 from .node_links import Scope, Unsupported
-from .ray_nodes import DIFFUSE_RAY, layer_weight_mean
+from .ray_nodes import Viewer, layer_weight_mean
 from .surface_samples import SurfaceSamples
 from .temporary import leave_nothing_behind, new_camera, plain_render_settings, render_pixels
 
@@ -24,9 +24,14 @@ _MOST_ROWS = 512  # of places in one render
 
 
 def render_places(
-    material: bpy.types.Material, socket: bpy.types.NodeSocket, scope: Scope | None, samples: SurfaceSamples
+    material: bpy.types.Material,
+    socket: bpy.types.NodeSocket,
+    scope: Scope | None,
+    samples: SurfaceSamples,
+    viewer: Viewer,
 ) -> np.ndarray:
-    """(rows, columns, 3) float32 values of the output ``socket`` at the texels of the atlas of ``samples``.
+    """(rows, columns, 3) float32 values of the output ``socket`` at the texels of the atlas of ``samples``, as
+    ``viewer`` sees them.
 
     Raises:
         Unsupported: it depends on something that ``samples`` do not know.
@@ -37,7 +42,7 @@ def render_places(
         tree = copy.node_tree
         show_alone(tree, exposed_in_groups(tree, socket, scope))
         wanted: set[str] = set()
-        _replace_places(tree, wanted)
+        _replace_places(tree, wanted, viewer)
         arrays = {name: samples.array(name) for name in sorted(wanted)}
         normals = samples.array("object normal") if _projects_boxes(tree) else None
         parts = []
@@ -107,7 +112,7 @@ _WITHOUT_PLACE = {
 }
 
 
-def _replace_places(tree: bpy.types.NodeTree, wanted: set[str]) -> None:
+def _replace_places(tree: bpy.types.NodeTree, wanted: set[str], viewer: Viewer) -> None:
     """Feed what depends on the place from attributes; node groups are copied for it. Adds to ``wanted``."""
     made: dict[str, bpy.types.Node] = {}
 
@@ -121,14 +126,14 @@ def _replace_places(tree: bpy.types.NodeTree, wanted: set[str]) -> None:
     for node in list(tree.nodes):
         if node.type == "GROUP" and node.node_tree is not None:
             node.node_tree = node.node_tree.copy()
-            _replace_places(node.node_tree, wanted)
+            _replace_places(node.node_tree, wanted, viewer)
             continue
         for socket in node.outputs:
             if not socket.is_linked:
                 continue
             targets = [link.to_socket for link in socket.links]
-            if node.bl_idname in ("ShaderNodeLightPath", "ShaderNodeFresnel", "ShaderNodeLayerWeight"):
-                _fix(tree, node, socket, targets)
+            if node.bl_idname in _OF_RAYS or socket.name == "Backfacing":
+                _fix(tree, node, socket, targets, viewer)
                 continue
             try:
                 name = place_of(node, socket)
@@ -150,10 +155,15 @@ def _replace_places(tree: bpy.types.NodeTree, wanted: set[str]) -> None:
             tree.links.new(attribute(name).outputs["Vector"], vector)
 
 
-def _fix(tree, node, socket, targets) -> None:
-    """Replace what depends on the ray by its mean over diffuse rays."""
+_OF_RAYS = {"ShaderNodeLightPath", "ShaderNodeFresnel", "ShaderNodeLayerWeight"}
+
+
+def _fix(tree, node, socket, targets, viewer: Viewer) -> None:
+    """Replace what depends on the ray by what ``viewer`` is told, on the mean."""
     if node.bl_idname == "ShaderNodeLightPath":
-        number = DIFFUSE_RAY.get(socket.name, 0.0)
+        number = viewer.light_path(socket.name)
+    elif node.bl_idname == "ShaderNodeNewGeometry":
+        number = viewer.backfacing
     elif node.bl_idname == "ShaderNodeFresnel":
         number = fresnel_mean(float(node.inputs["IOR"].default_value))
     else:

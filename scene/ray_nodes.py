@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Nodes whose value depends on the ray that asks: answered for the diffuse rays of a bake, averaged over directions
-with the cosine."""
+with the cosine, or for its shadow rays."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from .albedos import fresnel_mean
 from .node_links import Unsupported
-from .shader_values import ONE, ZERO, constant
+from .shader_values import ONE, constant
 
 # Light Path outputs as a diffuse ray after its first bounce sees them.
 DIFFUSE_RAY = {
@@ -18,16 +20,34 @@ DIFFUSE_RAY = {
     "Ray Depth": 1.0,
     "Diffuse Depth": 1.0,
 }
+_SHADOW_RAY = {"Is Shadow Ray": 1.0, "Ray Length": 1.0, "Ray Depth": 1.0, "Diffuse Depth": 1.0}
+
+
+@dataclass(frozen=True)
+class Viewer:
+    """What the ray that asks is, and where it looks from."""
+
+    behind: bool = False
+    shadow: bool = False  # on its way to a lamp; else one that bounces
+
+    def light_path(self, output: str) -> float:
+        """What the Light Path node tells this ray at ``output``."""
+        return (_SHADOW_RAY if self.shadow else DIFFUSE_RAY).get(output, 0.0)
+
+    @property
+    def backfacing(self) -> float:
+        return float(self.behind)
 
 
 def _light_path(evaluator, node, socket, scope):
-    return constant(DIFFUSE_RAY.get(socket.name, 0.0))
+    evaluator.asks_kind |= DIFFUSE_RAY.get(socket.name) != _SHADOW_RAY.get(socket.name)
+    return constant(evaluator.viewer.light_path(socket.name))
 
 
 def _geometry(evaluator, node, socket, scope):
     if socket.name == "Backfacing":
         evaluator.asks_side = True
-        return ONE if evaluator.behind else ZERO
+        return constant(evaluator.viewer.backfacing)
     raise Unsupported(f"'{socket.name}' differs from point to point")
 
 

@@ -23,6 +23,7 @@ from .lights import INTENSITY_PROPERTY, LightTable
 from .materials import Look, MaterialTable
 from .notices import Notices
 from .placed_mesh import PlacedMesh, joined_surface
+from .shader_values import Domain
 from .surface_parts import AtlasUVs, SurfaceParts
 from .surface_values import ATLAS, Wants, wants
 from .temporary import at_frame
@@ -42,6 +43,14 @@ _MOST_ALONE = 64  # instances of meshes whose materials tell them apart; the res
 
 
 @dataclass
+class _Coat:
+    """What the triangles of a mesh show to some: where materials have a back of their own, there are several."""
+
+    rows: np.ndarray  # per slot, of the table of materials; −1 none
+    atlases: list[AtlasUVs]  # of those that have one
+
+
+@dataclass
 class _Instances:
     """All instances of one mesh with one set of materials."""
 
@@ -50,8 +59,7 @@ class _Instances:
     materials: list[bpy.types.Material | None]  # per slot, original datablocks
     look: Look
     facts: InstanceFacts  # of the first one
-    rows: np.ndarray = field(init=False)  # per slot, of the table of materials; as soon as they are read
-    atlases: list[AtlasUVs] = field(init=False)  # of those of its materials that have one
+    coats: list[_Coat] = field(default_factory=list)  # as soon as the materials are read
     matrices: list[np.ndarray] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
 
@@ -168,12 +176,11 @@ def _read(scene, view_layer, evaluate, pace: Pace, world: World | None = None) -
         group.materials = [override] if override else group.materials or [None]
         surfaces.add(group, group.materials)
     for group in harvest.groups.values():
-        group.rows = np.empty(len(group.materials), np.int32)
-        for slot, material in enumerate(group.materials):
-            group.rows[slot] = materials.index(material, group.look)
+        shown = []
+        for material in group.materials:
+            shown.append(materials.coats(materials.index(material, group.look)))
             yield
-        placed = {material for row, material in zip(group.rows, group.materials) if materials.domains[row] == ATLAS}
-        group.atlases = [atlas for material in placed if (atlas := surfaces.corner_uvs(material, group)) is not None]
+        group.coats = _coats(group, shown, materials, surfaces)
     surface = yield from pace.in_background(_surface, list(harvest.groups.values()), materials, notices)
     lights = LightTable(images, notices, measures=world is None)
     for found in harvest.lights:
@@ -306,22 +313,46 @@ def _all_triangulated(meshes: dict[tuple, tuple[MeshCopy, str]], notices: Notice
     return dict(zip(meshes, found))
 
 
+def _coats(group: _Instances, shown: list[list[int]], materials: MaterialTable, surfaces: SurfaceParts) -> list[_Coat]:
+    """``shown``: per slot the rows of its material."""
+    coats = []
+    for number in range(max(map(len, shown))):
+        rows = np.array([own[number] if number < len(own) else -1 for own in shown], np.int32)
+        placed = {
+            material for row, material in zip(rows, group.materials) if row >= 0 and materials.domains[row] == ATLAS
+        }
+        atlases = [atlas for material in placed if (atlas := surfaces.corner_uvs(material, group)) is not None]
+        coats.append(_Coat(rows, atlases))
+    return coats
+
+
 def _surface(groups: list[_Instances], materials: MaterialTable, notices: Notices) -> dict[str, np.ndarray]:
     """All triangles of the scene with their per-triangle arrays. Asks Blender nothing: all materials are read."""
-    arrays, without_uvs = _kept_surface(
-        [
-            PlacedMesh(
-                group.mesh,
-                group.rows,
-                [materials.domains[row] if materials.is_textured(row) else None for row in group.rows],
-                np.array([materials.is_hole(row) for row in group.rows], bool),
-                group.atlases,
-                np.array(group.matrices),
-            )
-            for group in groups
-        ]
-    )
+    first = np.cumsum([0, *(len(group.matrices) for group in groups)])
+    placed, sources = [], []
+    for number in range(max((len(group.coats) for group in groups), default=0)):  # most scenes have one
+        for group, first_object in zip(groups, first.tolist()):
+            if number < len(group.coats):
+                placed.append(_placed(group, group.coats[number], first_object, materials))
+                sources.append((group, group.coats[number]))
+    arrays, without_uvs = _kept_surface(placed)
     for index, slot in without_uvs:
-        name = materials.materials[groups[index].rows[slot]].name
-        notices.group(f"without the UV map of material '{name}' a texture shows one colour", groups[index].names[0])
+        group, coat = sources[index]
+        name = materials.materials[coat.rows[slot]].name
+        notices.group(f"without the UV map of material '{name}' a texture shows one colour", group.names[0])
     return arrays
+
+
+def _placed(group: _Instances, coat: _Coat, first_object: int, materials: MaterialTable) -> PlacedMesh:
+    def domain(row: int) -> Domain | None:
+        return materials.domains[row] if row >= 0 and materials.is_textured(row) else None
+
+    return PlacedMesh(
+        group.mesh,
+        coat.rows,
+        [domain(row) for row in coat.rows],
+        np.array([row < 0 or materials.is_hole(row) for row in coat.rows], bool),
+        coat.atlases,
+        np.array(group.matrices),
+        first_object,
+    )

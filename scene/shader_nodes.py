@@ -15,7 +15,7 @@ from .blackbody import blackbody_color
 from .images import ImageTable
 from .node_links import Reported, Scope, Unsupported, find_socket, resolve
 from .notices import Notices
-from .ray_nodes import RAY_NODES
+from .ray_nodes import RAY_NODES, Viewer
 from .shader_values import SCATTERED, Value, apply, as_number, blend, constant, mixed_domains
 from .texture_coordinates import domain_of
 
@@ -28,16 +28,26 @@ class NodeEvaluator:
         owner_name: the datablock's name alone, for warnings that list several.
         sample: answers for outputs that have no counterpart here; called with the evaluator, the socket and its scope,
             it returns a Value or raises Unsupported. Without it they are not supported.
+        viewer: who asks.
     """
 
-    def __init__(self, owner: str, images: ImageTable, notices: Notices, owner_name: str, sample=None):
+    def __init__(
+        self,
+        owner: str,
+        images: ImageTable,
+        notices: Notices,
+        owner_name: str,
+        sample=None,
+        viewer: Viewer = Viewer(),
+    ):
         self.sample = sample
         self.owner = owner
         self.owner_name = owner_name
         self.images = images
         self.notices = notices
-        self.behind = False  # what is asked for is what the surface shows from behind
-        self.asks_side = False  # that differs from what it shows from the front
+        self.viewer = viewer
+        self.asks_side = False  # from behind the answer may be another one
+        self.asks_kind = False  # to shadow rays, too
         self.loses_pattern = False  # something that changes over the surface entered with one value
         self._values: dict[tuple, Value] = {}
 

@@ -55,7 +55,6 @@ class Closure:
     emission: Value = constant([0.0, 0.0, 0.0])
     through: Value = constant([0.0, 0.0, 0.0])
     tint: Value = WHITE
-    one_sided: bool = False  # from behind nothing is there
     mirrored: Mirrored = NOTHING_MIRRORED
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from .node_links import Reported, Scope, Unsupported, resolve
 from .placed_render import place_of, render_places
+from .ray_nodes import Viewer
 from .shader_nodes import NodeEvaluator
 from .shader_values import Domain, Value
 from .surface_samples import SurfaceSamples
@@ -26,8 +27,17 @@ ATLAS = Domain(ATLAS_MAP, extension="ATLAS")
 class SurfaceEvaluator(NodeEvaluator):
     """A NodeEvaluator whose values lie on the atlas of ``samples`` wherever they depend on the place."""
 
-    def __init__(self, owner, images, notices, owner_name, material: bpy.types.Material, samples: SurfaceSamples):
-        super().__init__(owner, images, notices, owner_name)
+    def __init__(
+        self,
+        owner,
+        images,
+        notices,
+        owner_name,
+        material: bpy.types.Material,
+        samples: SurfaceSamples,
+        viewer: Viewer = Viewer(),
+    ):
+        super().__init__(owner, images, notices, owner_name, viewer=viewer)
         self._material, self._samples = material, samples
 
     def output(self, socket: bpy.types.NodeSocket, scope: Scope | None) -> Value:
@@ -39,7 +49,7 @@ class SurfaceEvaluator(NodeEvaluator):
                     self.notices.append(f"{self.owner}: {reason} have no counterpart here; a middle value is used")
                 pixels = self._given(socket)
                 if pixels is None:
-                    pixels = render_places(self._material, socket, scope, self._samples)
+                    pixels = render_places(self._material, socket, scope, self._samples, self.viewer)
                     if socket.type == "VALUE":
                         pixels = np.ascontiguousarray(pixels[..., :1])
                 for name in sorted(self._samples.missing):

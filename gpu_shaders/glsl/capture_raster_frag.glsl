@@ -27,7 +27,7 @@ void main()
   barycentric = weights.yz / (weights.x + weights.y + weights.z);
 #ifdef HAS_UNSEEN
   int flags = int(element(triangle_corners, 3 * index + 1).w); /* see ray_lib */
-  if ((flags & 4) != 0 || ((flags & 8) != 0 && slope > 0.0)) {
+  if ((flags & 4) != 0 || ((flags & 8) != 0 && slope > 0.0) || ((flags & 16) != 0 && slope < 0.0)) {
     discard;
   }
 #endif

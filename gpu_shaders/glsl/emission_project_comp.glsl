@@ -33,7 +33,7 @@ Candidate candidate(vec3 origin, uvec3 key, int index)
   Candidate result;
   vec2 place = sample_r2(key, index);
   float jitter = sample_r2(key + uvec3(1u, 0u, 0u), index).x;
-  EmitterSample emitter = sample_emitter(vec3(place, (float(index) + jitter) / float(CANDIDATE_COUNT)));
+  EmitterSample emitter = sample_emitter(vec3(place, (float(index) + jitter) / float(CANDIDATE_COUNT)), origin);
   vec3 offset = emitter.point - origin;
   float squared = max(dot(offset, offset), 1.0e-20);
   result.distance = sqrt(squared);

@@ -47,13 +47,15 @@ vec3 emitter_radiance(int triangle, vec2 barycentric)
   return radiance;
 }
 
-EmitterSample sample_emitter(vec3 u)
+/* Light from the point that `u` picks, as `viewer` sees it: none where that looks at a side that is not there. */
+EmitterSample sample_emitter(vec3 u, vec3 viewer)
 {
   EmitterSample chosen;
   vec4 emitter = element(emitters, find_emitter(u.z));
   int triangle = int(emitter.x);
   vec3 a = element(triangle_corners, 3 * triangle).xyz;
-  vec3 ab = element(triangle_corners, 3 * triangle + 1).xyz - a;
+  vec4 corner1 = element(triangle_corners, 3 * triangle + 1);
+  vec3 ab = corner1.xyz - a;
   vec3 ac = element(triangle_corners, 3 * triangle + 2).xyz - a;
   float root = sqrt(u.x);
   vec2 barycentric = vec2(root * (1.0 - u.y), root * u.y);
@@ -62,6 +64,11 @@ EmitterSample sample_emitter(vec3 u)
   chosen.density = emitter.z;
   chosen.radiance = emitter_radiance(triangle, barycentric);
   chosen.group = 0;
+#ifdef HAS_UNSEEN
+  if (is_missing_side(int(corner1.w), dot(chosen.normal, chosen.point - viewer))) {
+    chosen.radiance = vec3(0.0);
+  }
+#endif
 #ifdef HAS_LINKS
   chosen.group = group_of_triangle(triangle);
   chosen.radiance = falls_on(chosen.group, lit_role) ? chosen.radiance : vec3(0.0);
@@ -102,7 +109,7 @@ vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, 
   float best_weight = 0.0, total = 0.0;
   float choice = sample_r3(key + uvec3(0x68E31DA4u, 0u, 0u), index).x;
   for (int i = 0; i < CANDIDATES; i++) {
-    EmitterSample emitter = sample_emitter(sample_r3(key, index * CANDIDATES + i));
+    EmitterSample emitter = sample_emitter(sample_r3(key, index * CANDIDATES + i), point);
     vec3 offset = emitter.point - point;
     float squared = max(dot(offset, offset), 1.0e-20);
     float distance = sqrt(squared);
@@ -193,7 +200,7 @@ vec3 emitter_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int ind
 /* Irradiance by one candidate if nothing stood between: candidate `index` of the sequence of `key`. */
 vec3 emitter_unshadowed(vec3 point, vec3 normal, uvec3 key, int index)
 {
-  EmitterSample emitter = sample_emitter(sample_r3(key, index));
+  EmitterSample emitter = sample_emitter(sample_r3(key, index), point);
   vec3 offset = emitter.point - point;
   float squared = max(dot(offset, offset), 1.0e-20);
   float distance = sqrt(squared);

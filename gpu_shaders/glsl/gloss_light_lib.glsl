@@ -169,7 +169,7 @@ vec3 emitters_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, flo
   float best_weight = 0.0, total = 0.0;
   float choice = sample_r3(key + uvec3(0x68E31DA4u, 0u, 0u), index).x;
   for (int i = 0; i < CANDIDATES; i++) {
-    EmitterSample emitter = sample_emitter(sample_r3(key, index * CANDIDATES + i));
+    EmitterSample emitter = sample_emitter(sample_r3(key, index * CANDIDATES + i), surface.position);
     vec3 offset = emitter.point - surface.position;
     float squared = max(dot(offset, offset), 1.0e-20);
     float distance = sqrt(squared);

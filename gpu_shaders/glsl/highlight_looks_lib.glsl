@@ -23,7 +23,7 @@ void look_at_part(inout Look look, FaintGloss faint, Surface surface, vec3 view,
 {
   coupling = surface.coupling;
 #ifdef HAS_EMITTERS
-  EmitterSample emitter = sample_emitter(sample_r3(key, index));
+  EmitterSample emitter = sample_emitter(sample_r3(key, index), surface.position);
   vec3 offset = emitter.point - surface.position;
   float squared = max(dot(offset, offset), 1.0e-20);
   vec3 towards = offset * inversesqrt(squared);

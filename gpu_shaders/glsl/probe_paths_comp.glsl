@@ -68,7 +68,7 @@ vec3 flux_of_emitters(vec3 start, uvec3 key, int number, out vec3 towards)
   vec3 flux = vec3(0.0);
   towards = vec3(0.0, 0.0, 1.0);
 #ifdef HAS_EMITTERS
-  EmitterSample emitter = sample_emitter(sample_r3(key + uvec3(0u, 1u, 0u), number));
+  EmitterSample emitter = sample_emitter(sample_r3(key + uvec3(0u, 1u, 0u), number), start);
   vec3 offset = emitter.point - start;
   float distance = max(length(offset), 1.0e-10);
   towards = offset / distance;

@@ -15,9 +15,9 @@
 
 const float NO_HIT = 3.0e38;
 const int NO_NODE = -2147483647; /* in place of a node or leaf */
-const int CLIPPED = 1, UNSEEN_BY_SHADOW_RAYS = 2, UNSEEN_BY_DIFFUSE_RAYS = 4,
-          UNSEEN_FROM_BEHIND = 8, TINTED = 16; /* bits of a triangle, w of its corner 1 */
-const int ROLE_SHIFT = 5; /* a triangle's role in light linking is what stands above its other bits */
+const int CLIPPED = 1, UNSEEN_BY_SHADOW_RAYS = 2, UNSEEN_BY_DIFFUSE_RAYS = 4, UNSEEN_FROM_BEHIND = 8,
+          UNSEEN_FROM_FRONT = 16, UNSEEN_BY_CAMERA = 32, TINTED = 64; /* bits of a triangle, w of its corner 1 */
+const int ROLE_SHIFT = 7; /* a triangle's role in light linking is what stands above its other bits */
 
 #ifdef HAS_LINKS
 /* Light linking, see core/light_links.py. links, LINK_GROUPS + 1 elements a role: group of its own emission; then for
@@ -140,6 +140,13 @@ bool meets(Ray ray, vec4 corner, vec4 corner1, vec4 corner2, float limit, out fl
          !starts_on(ray, corner.xyz - ray.origin, corner1.xyz - ray.origin, corner2.xyz - ray.origin);
 }
 
+/* Is the side of a triangle not there that looks against a ray, which runs along its normal so far? */
+bool is_missing_side(int flags, float along_normal)
+{
+  return ((flags & UNSEEN_FROM_BEHIND) != 0 && along_normal > 0.0) ||
+         ((flags & UNSEEN_FROM_FRONT) != 0 && along_normal < 0.0);
+}
+
 /* Does the ray pass a triangle because of its kind (`unseen`, as for intersect_triangle)? */
 bool is_unseen(Ray ray, vec4 corner, vec4 corner1, vec4 corner2, int unseen)
 {
@@ -153,8 +160,7 @@ bool is_unseen(Ray ray, vec4 corner, vec4 corner1, vec4 corner2, int unseen)
 #endif
 #ifdef HAS_UNSEEN
   if ((flags & unseen) != 0 ||
-      ((flags & UNSEEN_FROM_BEHIND) != 0 &&
-       dot(cross(corner1.xyz - corner.xyz, corner2.xyz - corner.xyz), ray.direction) > 0.0)) {
+      is_missing_side(flags, dot(cross(corner1.xyz - corner.xyz, corner2.xyz - corner.xyz), ray.direction))) {
     return true;
   }
 #endif
@@ -263,7 +269,7 @@ Hit trace_closest(vec3 origin, vec3 direction)
 /* What an eye sees. */
 Hit trace_view(vec3 origin, vec3 direction)
 {
-  return trace_nearest(origin, direction, NO_HIT, 0);
+  return trace_nearest(origin, direction, NO_HIT, UNSEEN_BY_CAMERA);
 }
 
 /* Down to a leaf, in any order; where nothing is left the function ends with `result`. */

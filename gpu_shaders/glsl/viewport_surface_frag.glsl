@@ -40,9 +40,11 @@ void main()
   }
 #ifdef HAS_UNSEEN
   vec4 corner1 = element(triangle_corners, 3 * index + 1);
-  if ((int(corner1.w) & UNSEEN_FROM_BEHIND) != 0) {
+  int flags = int(corner1.w);
+  if ((flags & (UNSEEN_BY_CAMERA | UNSEEN_FROM_BEHIND | UNSEEN_FROM_FRONT)) != 0) {
     vec3 a = element(triangle_corners, 3 * index).xyz;
-    if (dot(cross(corner1.xyz - a, element(triangle_corners, 3 * index + 2).xyz - a), direction) > 0.0) {
+    vec3 across = cross(corner1.xyz - a, element(triangle_corners, 3 * index + 2).xyz - a);
+    if ((flags & UNSEEN_BY_CAMERA) != 0 || is_missing_side(flags, dot(across, direction))) {
       discard;
     }
   }

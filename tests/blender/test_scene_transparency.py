@@ -3,7 +3,15 @@
 
 import numpy as np
 import pytest
-from gridlight.core.snapshot import DITHERED, FROM_BEHIND, NO_IMAGE
+from gridlight.core.snapshot import (
+    CAMERA_RAYS,
+    DIFFUSE_RAYS,
+    DITHERED,
+    FROM_BEHIND,
+    FROM_FRONT,
+    NO_IMAGE,
+    SHADOW_RAYS,
+)
 from scene_builders import empty_scene, image, material, node
 from shaded_square import HALF, OPAQUE, built, read, textured, warned
 
@@ -126,20 +134,75 @@ def test_a_pattern_of_translucency_enters_with_its_mean(scene):
         assert warned(snapshot, "translucency", "'Subject'") != shared
 
 
-def test_backs_that_are_not_there(scene):
-    """Walls that are transparent from behind; any other back is named."""
+def two_sided(front, back):
+    """A material that shows ``front`` from the front and ``back`` from behind: nodes' kinds and inputs."""
 
-    def shader(tree, back):
+    def shader(tree):
         facing = node(tree, "ShaderNodeNewGeometry").outputs["Backfacing"]
-        front = node(tree, "ShaderNodeBsdfDiffuse", {"Color": (0.4, 0.2, 0.6, 1)}).outputs[0]
-        other = node(tree, back).outputs[0]
-        mixed = {"Fac": facing, "Shader": front, "Shader_001": other}
-        return node(tree, "ShaderNodeMixShader", mixed).outputs[0]
+        one, other = (node(tree, kind, inputs).outputs[0] for kind, inputs in (front, back))
+        return node(tree, "ShaderNodeMixShader", {"Fac": facing, "Shader": one, "Shader_001": other}).outputs[0]
 
-    for back, unseen in (("ShaderNodeBsdfTransparent", FROM_BEHIND), ("ShaderNodeBsdfDiffuse", 0)):
-        made, snapshot = read(empty_scene(), built(lambda tree, back=back: shader(tree, back)))
-        assert made.base_color == pytest.approx((0.4, 0.2, 0.6)) and made.unseen_by == unseen
-        assert made.alpha_threshold == 0 and warned(snapshot, "Backfacing", "'Subject'") == (not unseen)
+    return built(shader)
+
+
+def rows_of(snapshot):
+    """What the triangles of the subject are made of, row by row: colour, emission, who does not see it, number."""
+    rows = [
+        (snapshot.materials[index], int((snapshot.material_index == index).sum()))
+        for index in np.unique(snapshot.material_index)
+    ]
+    return [(made.base_color, made.emission, made.unseen_by, count) for made, count in rows]
+
+
+DIFFUSE = ("ShaderNodeBsdfDiffuse", {"Color": (0.4, 0.2, 0.6, 1)})
+GREY = ("ShaderNodeBsdfDiffuse", {"Color": (0.5, 0.5, 0.5, 1)})
+GLOW = ("ShaderNodeEmission", {"Color": (1, 1, 1, 1), "Strength": 3.0})
+CLEAR = ("ShaderNodeBsdfTransparent", {})
+
+
+@pytest.mark.parametrize(
+    ("front", "back", "expected"),
+    [
+        (DIFFUSE, CLEAR, [((0.4, 0.2, 0.6), (0, 0, 0), FROM_BEHIND, 2)]),
+        (CLEAR, DIFFUSE, [((0.4, 0.2, 0.6), (0, 0, 0), FROM_FRONT, 2)]),
+        (GLOW, CLEAR, [((0, 0, 0), (3, 3, 3), FROM_BEHIND, 2)]),
+        (DIFFUSE, DIFFUSE, [((0.4, 0.2, 0.6), (0, 0, 0), 0, 2)]),
+        (DIFFUSE, GREY, [((0.4, 0.2, 0.6), (0, 0, 0), FROM_BEHIND, 2), ((0.5,) * 3, (0, 0, 0), FROM_FRONT, 2)]),
+        (GLOW, GREY, [((0, 0, 0), (3, 3, 3), FROM_BEHIND, 2), ((0.5,) * 3, (0, 0, 0), FROM_FRONT, 2)]),
+    ],
+)
+def test_backs_of_their_own(scene, front, back, expected):
+    """The triangles come twice where both sides are there, each for those who look at its side."""
+    _made, snapshot = read(empty_scene(), two_sided(front, back))
+    found = rows_of(snapshot)
+    assert len(found) == len(expected) and not snapshot.warnings
+    for row, other in zip(found, expected):
+        assert row[:2] == (pytest.approx(other[0]), pytest.approx(other[1])) and row[2:] == other[2:]
+    assert set(snapshot.object_index) == {0} and len(snapshot.object_names) == 1
+
+
+def test_shadows_of_their_own(scene):
+    """A surface that lets shadow rays through, wholly or half, and one that only they see."""
+
+    def shader(tree, shown, shadow):
+        ray = node(tree, "ShaderNodeLightPath").outputs["Is Shadow Ray"]
+        one, other = (node(tree, kind, inputs).outputs[0] for kind, inputs in (shown, shadow))
+        return node(tree, "ShaderNodeMixShader", {"Fac": ray, "Shader": one, "Shader_001": other}).outputs[0]
+
+    veil = ("ShaderNodeBsdfTransparent", {"Color": (0.5, 0.5, 0.5, 1)})
+    unseen = DIFFUSE_RAYS | CAMERA_RAYS
+    colour = (0.4, 0.2, 0.6)
+    for shown, shadow, expected in (
+        (DIFFUSE, CLEAR, [(colour, SHADOW_RAYS, 1.0)]),
+        (DIFFUSE, veil, [(colour, SHADOW_RAYS, 1.0), ((0, 0, 0), unseen, 0.5)]),
+        (CLEAR, GREY, [((0, 0, 0), unseen, 1.0)]),
+        (DIFFUSE, GREY, [(colour, 0, 1.0)]),
+    ):
+        _made, snapshot = read(empty_scene(), built(lambda tree, a=shown, b=shadow: shader(tree, a, b)))
+        found = [snapshot.materials[index] for index in np.unique(snapshot.material_index)]
+        assert [(row.unseen_by, row.alpha) for row in found] == [row[1:] for row in expected]
+        assert all(row.base_color == pytest.approx(other[0]) for row, other in zip(found, expected))
+        assert not snapshot.warnings
 
 
 def test_coloured_holes():

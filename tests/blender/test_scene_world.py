@@ -154,7 +154,10 @@ def test_light_path_and_camera_visibility_are_those_of_diffuse_rays(scene):
     tree.links.new(mixed.outputs[0], tree.nodes["World Output"].inputs["Surface"])
     scene.world.cycles_visibility.camera = False
     assert np.allclose(read_scene(scene).world.map, 1, atol=1e-4)
-    assert tree.nodes["Mix Shader"].inputs["Fac"].is_linked and not scene.world.cycles_visibility.camera
+    before = {(link.from_socket.path_from_id(), link.to_socket.path_from_id()) for link in tree.links}
+    assert np.allclose(render_panoramas(scene, [(0, 0, 0)], 8, 4, 1), 1, atol=1e-4)
+    assert {(link.from_socket.path_from_id(), link.to_socket.path_from_id()) for link in tree.links} == before
+    assert not scene.world.cycles_visibility.camera
     scene.world.cycles_visibility.diffuse = False
     assert read_scene(scene).world.map is None
 

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Small emissive surfaces, which are sampled like lamps, against closed forms and the reference."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gridlight.core.emitters import sampling_density
 from gridlight.core.grid import Grid
 from gridlight.core.settings import BakeSettings
-from gridlight.core.snapshot import Image, Material, World
+from gridlight.core.snapshot import FROM_BEHIND, FROM_FRONT, Image, Material, World
 from small_scenes import bake, box, furnace, irradiance_at_nodes, snapshot_of
 from stages import Stages
 
@@ -20,13 +22,13 @@ def panel(half_x, half_y, height):
     return np.array([[a, c, b], [a, d, c]])
 
 
-def room_with_panel(half_x=0.1, half_y=0.05, height=0.9, albedo=1.0):
+def room_with_panel(half_x=0.1, half_y=0.05, height=0.9, albedo=1.0, unseen_by=0):
     """A large room without a bounce to speak of and a lamp near its ceiling."""
     room = box((-4, -4, -1), (4, 4, 1))[:, ::-1]
     return snapshot_of(
         np.concatenate([room, panel(half_x, half_y, height)]),
         np.repeat([0, 1], [12, 2]),
-        [Material("white", (albedo,) * 3), Material("lamp", (0.0, 0.0, 0.0), emission=tuple(RADIANCE))],
+        [Material("white", (albedo,) * 3), Material("lamp", (0.0,) * 3, emission=tuple(RADIANCE), unseen_by=unseen_by)],
         np.repeat([0, 1], [12, 2]),
     )
 
@@ -79,8 +81,36 @@ def test_light_of_a_lamp_on_the_ceiling_right_above_it():
     np.testing.assert_allclose(irradiance[above].mean(axis=0), expected.mean(axis=0), rtol=0.03)
 
 
-def room_with_pictures():
-    """A room with three small things that glow: a picture, a net with holes, a panel beside the wall."""
+@pytest.mark.parametrize("unseen_by", [FROM_BEHIND, FROM_FRONT])
+def test_a_lamp_that_shines_to_one_side(unseen_by):
+    """It faces down. The lit side gets what it gets of a whole one, floor and ceiling, probes below and above."""
+    volume = Grid.from_bounds([0.3, 0.1, -0.5], [0.5, 0.3, 0.95], (1, 1, 2))
+    settings = BakeSettings(keep_all=True, face=32, bounces=0)
+    whole, one = (room_with_panel(height=0.5, unseen_by=sides) for sides in (0, unseen_by))
+    lit, dark = (-0.999, 0.999) if unseen_by == FROM_BEHIND else (0.999, -0.999)
+    light = {}
+    for name, snapshot in (("whole", whole), ("one", one)):
+        stages = Stages(snapshot, volume, settings)
+        hits, irradiance = stages.hits(), stages.irradiance_at_texels(64).reshape(-1, 3)
+        height = (hits[:, :3] + stages.grid.center)[:, 2]
+        near = (hits[:, 3] >= 0) & (np.abs((hits[:, :3] + stages.grid.center)[:, :2]).max(axis=1) < 2)
+        for where in (lit, dark):
+            light[name, where] = irradiance[near & (np.abs(height - where) < 2e-3)].mean(axis=0)
+    np.testing.assert_allclose(light["one", lit], light["whole", lit], rtol=0.02)
+    assert not light["one", dark].any() and light["whole", dark].all()
+    black = [
+        replace(snapshot, materials=[Material("black", (0.0,) * 3), snapshot.materials[1]]) for snapshot in (whole, one)
+    ]
+    fields = [bake(snapshot, volume, settings).field.coefficients[:, 0, 0] for snapshot in black]
+    bright = 0 if unseen_by == FROM_BEHIND else 1
+    assert (
+        fields[1][bright] == pytest.approx(fields[0][bright], rel=0.01) and fields[1][1 - bright] == 0 < fields[0].min()
+    )
+
+
+def room_with_pictures(sides=False):
+    """A room with three small things that glow: a picture, a net with holes, a panel beside the wall; two of them from
+    one of their ``sides`` alone."""
     generator = np.random.default_rng(2)
     noise = Image("noise", generator.random((8, 8, 4)).astype(np.float32))
     holes = np.ones((4, 4, 4), np.float32)
@@ -96,22 +126,29 @@ def room_with_pictures():
     materials = [
         Material("wall", (0.7, 0.6, 0.5)),
         Material("picture", (0.3, 0.3, 0.3), emission=(5.0, 4.0, 3.0), emission_image=0),
-        Material("net", (0.5, 0.5, 0.5), emission=(1.0, 3.0, 1.0), alpha_image=1, alpha_threshold=0.5),
-        Material("panel", (0.0, 0.0, 0.0), emission=(2.0, 2.0, 6.0)),
+        Material(
+            "net",
+            (0.5,) * 3,
+            emission=(1.0, 3.0, 1.0),
+            alpha_image=1,
+            alpha_threshold=0.5,
+            unseen_by=sides and FROM_FRONT,
+        ),
+        Material("panel", (0.0, 0.0, 0.0), emission=(2.0, 2.0, 6.0), unseen_by=sides and FROM_BEHIND),
     ]
     uvs = generator.uniform(0, 1, (18, 3, 2))
     images = [noise, Image("holes", holes, "EXTEND")]
     return snapshot_of(np.concatenate(parts), index, materials, index, uvs, images=images)
 
 
-def pictures(**settings):
+def pictures(sides=False, **settings):
     volume = Grid.from_bounds([-0.8, -0.9, -0.6], [1.0, 0.8, 0.7], (3, 2, 2))
-    return Stages(room_with_pictures(), volume, BakeSettings(keep_all=True, face=8, seed=3, **settings))
+    return Stages(room_with_pictures(sides), volume, BakeSettings(keep_all=True, face=8, seed=3, **settings))
 
 
-@pytest.mark.parametrize("samples", [5, 16])
-def test_points_and_directions_against_the_reference(samples):
-    stages = pictures()
+@pytest.mark.parametrize(("samples", "sides"), [(5, False), (16, False), (16, True)])
+def test_points_and_directions_against_the_reference(samples, sides):
+    stages = pictures(sides)
     patches = np.arange(0, stages.light.count, 5)
     found = stages.direct_of(patches, samples)
     expected = stages.reference.light.direct_light(stages.points, patches, samples)

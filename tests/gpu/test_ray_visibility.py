@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gridlight.core.grid import Grid
 from gridlight.core.settings import BakeSettings
-from gridlight.core.snapshot import DIFFUSE_RAYS, FROM_BEHIND, SHADOW_RAYS, Light, Material, World
+from gridlight.core.snapshot import DIFFUSE_RAYS, FROM_BEHIND, FROM_FRONT, SHADOW_RAYS, Light, Material, World
 from small_scenes import all_lights, bake, cluttered_room, frame, snapshot_of
 from stages import Stages
 
@@ -57,7 +57,7 @@ def test_what_no_shadow_ray_sees_casts_none():
 def test_stages_agree():
     """Texels, direct light and rays of a cluttered room, some of whose clutter only one kind of ray sees."""
     snapshot = cluttered_room({name: all_lights()[name] for name in ("point", "sun wide", "rectangle")})
-    for number, unseen_by in ((4, SHADOW_RAYS), (0, DIFFUSE_RAYS), (5, FROM_BEHIND)):
+    for number, unseen_by in ((4, SHADOW_RAYS), (0, DIFFUSE_RAYS), (5, FROM_BEHIND), (3, FROM_FRONT)):
         snapshot.materials[number] = replace(snapshot.materials[number], unseen_by=unseen_by)
     stages = Stages(snapshot, GRID, BakeSettings(face=8, keep_all=True, seed=5))
     expected = stages.reference.capture()
@@ -84,3 +84,21 @@ def test_what_is_not_there_from_behind(method):
     np.testing.assert_allclose(down, plain, rtol=1e-4)
     np.testing.assert_allclose(up, open_sky, rtol=1e-4)
     assert (open_sky > plain + 0.1).all()
+
+
+@pytest.mark.parametrize("method", ["trace", "raster"])
+def test_two_sides_of_one_surface(method):
+    """The same triangles twice, each from one side, are what a screen of the colour of that side is."""
+    plain = scene(0)
+    for chosen, turn in ((2, FROM_BEHIND), (1, FROM_FRONT)):  # from below the screen is seen from behind
+        grey = Material("grey", (0.0,) * 3, emission=(0.4,) * 3)
+        corners = np.concatenate([plain.triangle_positions, plain.triangle_positions[2:]])
+        sides = [
+            replace(plain.materials[1], unseen_by=FROM_BEHIND if chosen == 2 else FROM_FRONT),
+            replace(grey, unseen_by=FROM_FRONT if chosen == 2 else FROM_BEHIND),
+        ]
+        two = snapshot_of(
+            corners, [0, 0, 1, 1, 2, 2], [plain.materials[0], *sides], lights=plain.lights, world=plain.world
+        )
+        one = replace(plain, materials=[plain.materials[0], grey if chosen == 2 else plain.materials[1]])
+        np.testing.assert_allclose(below(two, method), below(one, method), rtol=1e-3, err_msg=str(turn))
