@@ -8,8 +8,8 @@ import pytest
 import sided_rooms
 from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.job import run_bake
-from gridlight.cli.progress import Reporter
 from gridlight.cli import verify, verify_points
+from gridlight.cli.progress import Reporter
 from gridlight.cli.verify_measure import Reference, measure
 from gridlight.core.settings import BakeSettings
 from gridlight.scene.read import read_scene
