@@ -35,6 +35,7 @@ class BlenderProcess:
         self._job = job
         self._process: subprocess.Popen | None = None
         self._log: IO[bytes] | None = None
+        self._pending = b""  # of an answer that is not whole yet
 
     @property
     def pid(self) -> int | None:

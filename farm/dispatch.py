@@ -45,6 +45,7 @@ class Dispatcher:
         self._tries: dict[Work, int] = {}
         self._owner: dict[tuple, str] = {}  # worker that captured blocks last, by volume and blocks
         self._refused: set[str] = set()
+        self._refusal = ""  # why the last one did
         self._poison: set[int] = set()
         self._alone_since: float | None = None
 

@@ -16,15 +16,19 @@ MOST_NAMES = 1 << 15  # drivers number objects from 1 upwards and use numbers ag
 
 
 def resident_mib() -> float:
-    """MiB of memory in use now. With a software driver this includes what the GPU holds. What has been freed is given
-    back to the system first: how much of it an allocator keeps for later is a matter of chance."""
+    """MiB of memory in use now. With a software driver this includes what the GPU holds.
+
+    What has been freed is given back to the system first, for how much of it an allocator keeps is a matter of chance.
+    Pages of programs and libraries do not count: the system reads them in and drops them as it likes.
+    """
     gc.collect()
     _give_back()
     status = Path("/proc/self/status").read_text()
-    return int(re.search(r"VmRSS:\s+(\d+) kB", status)[1]) / 1024
+    return sum(int(re.search(rf"{kind}:\s+(\d+) kB", status)[1]) for kind in ("RssAnon", "RssShmem")) / 1024
 
 
 def _give_back() -> None:
+    ctypes.CDLL("libGL.so.1").glFinish()  # a driver keeps what it still works with
     ctypes.CDLL("libc.so.6").malloc_trim(0)
     with contextlib.suppress(OSError):  # no such library: nothing was put in malloc's place, as Debian's Blender does
         tbb = ctypes.CDLL("libtbbmalloc.so.2", mode=os.RTLD_NOLOAD | os.RTLD_NOW)
