@@ -13,6 +13,7 @@ import numpy as np
 from .cubemap import direction_to_texel, texel_solid_angles
 from .emitters import CANDIDATES, PROBE_POINTS, PROBE_RAYS, reach
 from .faint_gloss import coupled
+from .rays import Hits
 from .reference_scene import ReferenceScene, Surfaces
 from .sampling import WeightedChoice, keys_of, sample_cosine, sample_r2, sample_r3, shifted
 from .settings import BakeSettings
@@ -102,7 +103,7 @@ class ReferenceEmitters:
         """(N, 3) irradiance at ``points`` (N, 3) by sample ``index`` of the sequences of ``keys`` (N, 3): one point on
         the emitters and one direction about the normal, weighted by the balance heuristic. Rays start at ``origins``
         (N, 3), surfaces have ``role`` (N,) in light linking and take light by their ``coupling`` (N, 4)."""
-        return self._by_points(points, origins, normals, keys, index, role, coupling) + self.by_directions(
+        return self.by_points(points, origins, normals, keys, index, role, coupling) + self.by_directions(
             origins, normals, keys, index, role, coupling
         )
 
@@ -143,9 +144,9 @@ class ReferenceEmitters:
         alone = (distance >= self.reach) | ~self.scene.links.blocks.all(axis=0)[group]
         return np.where(alone, 1.0, points / np.maximum(points + directions, 1e-300))
 
-    def _by_points(self, points, origins, normals, keys, index, role, coupling) -> np.ndarray:
-        """Resampled: CANDIDATES points by power, one of them by what it would send if nothing stood between; a single
-        number chooses among them one after the other."""
+    def by_points(self, points, origins, normals, keys, index, role, coupling=None) -> np.ndarray:
+        """The part of ``irradiance`` that points answer for. Resampled: CANDIDATES points by power, one of them by what
+        it would send if nothing stood between; a single number chooses among them one after the other."""
         choice = WeightedChoice(sample_r3(shifted(keys, _CHOICE_STREAM, 0, 0), index)[:, 0])
         best = _Arrival(np.zeros_like(points), np.zeros_like(points), np.zeros(len(points), int))
         for candidate in range(CANDIDATES):
@@ -179,28 +180,31 @@ class ReferenceEmitters:
         u = sample_r2(shifted(keys, 0, _DIRECTION_STREAM, 0), index).astype(float)
         direction = sample_cosine(normals, u)
         hits = self.scene.closest(origins, direction)
-        found = np.flatnonzero((hits.triangle >= 0) & (hits.distance < self.reach))
-        found = found[self.density[hits.triangle[found]] > 0]
-        found = found[self.scene.falls_on(self._group(hits.triangle[found]), role[found])]
-        triangle, direction = hits.triangle[found], direction[found]
+        cosine = np.einsum("ni,ni->n", direction, normals)
+        share = self.direction_share(hits, direction, cosine, role)
+        found = np.flatnonzero(share)
+        radiance = self.scene.emission(hits.triangle[found], hits.barycentric[found])
+        tint = self.scene.tint(origins[found], direction[found], hits.distance[found], DIFFUSE_RAYS)
+        result = np.zeros_like(origins)
+        result[found] = radiance * (share[found] * np.pi)[:, None] * tint
+        return result if coupling is None else result * coupled(coupling, cosine)
+
+    def direction_share(self, hits: Hits, direction: np.ndarray, cosine: np.ndarray, role: np.ndarray) -> np.ndarray:
+        """(N,) share of the emission of sampled emitters among ``hits`` (N) that directions about a normal answer for:
+        rays along ``direction`` (N, 3), at ``cosine`` (N,) to the normal, from surfaces of ``role`` (N,)."""
+        found = np.flatnonzero(hits.triangle >= 0)
+        triangle = hits.triangle[found]
+        falls = (self.density[triangle] > 0) & self.scene.falls_on(self._group(triangle), role[found])
+        found, triangle = found[falls], triangle[falls]
         edge = self.scene.triangles[triangle, 1:] - self.scene.triangles[triangle, :1]
         normal = np.cross(edge[:, 0], edge[:, 1])
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        cosine = np.einsum("ni,ni->n", direction, normals[found])
-        share = self._point_share(
-            self._group(triangle),
-            self.density[triangle],
-            hits.distance[found],
-            cosine,
-            np.abs(np.einsum("ni,ni->n", direction, normal)),
-        )
-        result = np.zeros_like(origins)
-        radiance = self.scene.emission(triangle, hits.barycentric[found])
-        tint = self.scene.tint(origins[found], direction, hits.distance[found], DIFFUSE_RAYS)
-        result[found] = radiance * ((1.0 - share) * np.pi)[:, None] * tint
-        if coupling is not None:
-            result[found] *= coupled(coupling[found], cosine)
-        return result
+        emitter_cosine = np.abs(np.einsum("ni,ni->n", direction[found], normal))
+        distance = hits.distance[found]
+        how = self._group(triangle), self.density[triangle], distance, cosine[found], emitter_cosine
+        share = np.zeros(len(direction))
+        share[found] = 1.0 - self._point_share(*how)
+        return share
 
     # At probes
     # ------------------------------------------------------------------------------------------------------------------

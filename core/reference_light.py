@@ -256,14 +256,17 @@ class ReferenceLight:
             alive = np.flatnonzero(reflected.any(axis=1))
             u = sample_r2(shifted(keys[alive], 0, segment, 0), index[alive]).astype(float)
             direction = sample_cosine(normal[alive], u)
-            reflected[alive] *= coupled(coupling[alive], np.einsum("ni,ni->n", normal[alive], direction))
+            cosine = np.einsum("ni,ni->n", normal[alive], direction)
+            reflected[alive] *= coupled(coupling[alive], cosine)
             found = self.scene.closest(origin[alive], direction)
             surface = self.scene.resolve(found, direction, _RAY_SPREAD)
             missed = found.triangle < 0
             reflected[alive] *= self.scene.tint(origin[alive], direction, found.distance, DIFFUSE_RAYS)
-            unlit = ~self.scene.falls_on(self.scene.links.group[self.scene.role[found.triangle]], role[alive])
-            dark = ~missed & (unlit | (self.emitters.density[found.triangle] > 0))
-            emission = np.where(dark[:, None], 0.0, surface.emission)
+            lit = self.scene.falls_on(self.scene.links.group[self.scene.role[found.triangle]], role[alive])
+            share = np.where(lit & (self.emitters.density[found.triangle] == 0), 1.0, 0.0)
+            if segment > 0:
+                share += self.emitters.direction_share(found, direction, cosine, role[alive])
+            emission = surface.emission * share[:, None]
             carried[alive] += reflected[alive] * np.where(missed[:, None], self.background(direction), emission)
             position = origin[alive] + direction * np.where(missed, 0.0, found.distance)[:, None]
             ways = Ways(direction, surface, position, reflected[alive], carried[alive])
@@ -301,13 +304,16 @@ class ReferenceLight:
         )
 
     def _at_bounces(self, position, facing, direction, distance, sheet, keys, index, role, coupling) -> np.ndarray:
-        """(C, 3) direct irradiance where rays have met surface, (C, …) each, from both sides of sheets."""
+        """(C, 3) direct irradiance where rays have met surface, (C, …) each, from both sides of sheets. Of emitters what
+        points answer for: the ray that goes on from there finds the rest."""
         arriving = np.zeros((len(position), 3))
         for side, normals, side_keys, share in self._sides(facing, keys, np.arange(len(position)), sheet):
             towards = np.where((normals * facing[side]).sum(axis=1, keepdims=True) > 0, -1, 1)
             start = step_off(position[side], normals, towards * direction[side], distance[side])
-            how = index[side], role[side], coupling[side]
-            arriving[side] += share * self._irradiance(position[side], start, normals, side_keys, side_keys, *how)
+            how = position[side], start, normals, side_keys, index[side], role[side], coupling[side]
+            arriving[side] += share * self._lamps.irradiance(*how)
+            if self.emitters.count:
+                arriving[side] += share * self.emitters.by_points(*how)
         return arriving
 
     def connect(self) -> None:

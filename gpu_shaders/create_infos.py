@@ -213,7 +213,7 @@ def _light_files(defines: dict) -> list[str]:
     """What it takes to light a point: rays, lamps and sampled emitters."""
     surfaces = ["surface_lib"] if "HAS_EMITTERS" in defines or "HAS_ALPHA" in defines else []
     emitters = ["emitter_lib"] if "HAS_EMITTERS" in defines else []
-    return ["random_lib", *surfaces, "offset_lib", "ray_lib", "direct_light_lib", *emitters]
+    return ["random_lib", *surfaces, "offset_lib", "ray_lib", "direct_light_lib", *emitters, "light_rays_lib"]
 
 
 def _mirrored(info, defines: dict, first: int) -> int:

@@ -52,10 +52,10 @@ def gloss(info, defines: dict, first: int) -> int:
     return _samplers(info, "gloss_rows", first=first)
 
 
-def gloss_files(defines: dict, rays: bool = True) -> list[str]:
-    """What follows mirrored ``rays``, to come after what lights points."""
-    following = ["way_lib", "gloss_light_lib", "reflection_lib"] if rays else []
-    return ["gloss_lib", *following] if "HAS_GLOSS" in defines else []
+def path_files(defines: dict) -> list[str]:
+    """What follows rays from surface to surface, mirrored ones among them, to come after what lights points."""
+    gloss = ["gloss_lib", "gloss_light_lib", "reflection_lib"] if "HAS_GLOSS" in defines else []
+    return ["way_lib", "path_lib", *gloss]
 
 
 def _glossy_texels(info, *names: str) -> None:
@@ -79,8 +79,24 @@ def glossy_list_comp(info, defines):
     return _compaction(info, "glossy_texels_lib", "compaction_lib", "compact_list_comp")
 
 
-def texel_reflections_comp(info, defines):
+def _glossy_entries(info, defines: dict, *names: str) -> None:
+    """What shaders read that ask what glossy texels mirror, and samplers ``names``."""
     info.define("REFLECTIONS", str(TEXEL_RAYS))
+    slot = gloss(info, defines, _emitters(info, defines, _scene(info, defines)))
+    slot = _samplers(info, "lights", "probe_slots", "glossy", *names, first=slot)
+    _samplers(info, "geometry", kind="FLOAT_2D_ARRAY", first=_sheets(info, defines, slot))
+    _ints(info, "first_slot", "first_layer", "first", "count", "light_count", "seed")
+    info.local_group_size(64, 1, 1)
+
+
+def _glossy_entry_files(defines: dict, *files: str) -> dict:
+    *libraries, own = files
+    libraries = [*_light_files(defines | {"HAS_ALPHA": True}), *libraries, *_sheet_files(defines)]
+    entries = ["texel_ways_lib", "glossy_entry_lib"]
+    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *libraries, *entries, own]}
+
+
+def texel_lamps_comp(info, defines):
     for name, value in (
         ("LOOKS", TEXEL_LOOKS),
         ("LEAST_LOOKS", LEAST_LOOKS),
@@ -88,26 +104,21 @@ def texel_reflections_comp(info, defines):
         ("LOOKS_A_RAY", LOOKS_A_RAY),
     ):
         info.define(name, str(value))
-    slot = gloss(info, defines, _emitters(info, defines, _scene(info, defines)))
-    slot = _samplers(info, "lights", "probe_slots", "world_texels", "glossy", first=slot)
-    slot = _sheets(info, defines, slot)
-    _samplers(info, "geometry", kind="FLOAT_2D_ARRAY", first=slot)
-    for number, name in enumerate(("hits", "reflected", "carried")):
-        _image(info, number, name)
+    _glossy_entries(info, defines)
+    _image(info, 0, "carried")
+    return _glossy_entry_files(defines, "way_lib", "gloss_lib", "gloss_light_lib", "texel_lamps_comp")
+
+
+def texel_reflections_comp(info, defines):
+    _glossy_entries(info, defines, "world_texels")
+    _image(info, 0, "carried", access="READ+WRITE")
+    _image(info, 1, "hits")
+    _image(info, 2, "reflected")
     _image(info, 3, "albedo", layered=True, access="READ+WRITE")
     _image(info, 4, "entries", pixel="R32F")
     if "HAS_SHEETS" in defines:
         _image(info, 5, "hit_sheets", pixel="R32F")
-    _ints(info, "first_slot", "first_layer", "first", "count", "light_count", "seed")
-    info.local_group_size(64, 1, 1)
-    files = [
-        *_light_files(defines | {"HAS_ALPHA": True}),
-        *gloss_files(defines),
-        *_sheet_files(defines),
-        "texel_ways_lib",
-        "texel_lamps_lib",
-    ]
-    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *files, "texel_reflections_comp"]}
+    return _glossy_entry_files(defines, *path_files(defines), "texel_reflections_comp")
 
 
 def texel_mirrored_comp(info, defines):

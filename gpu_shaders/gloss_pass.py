@@ -68,16 +68,37 @@ class GlossPass:
         entries = scratch(count * texels_each, "texels", "R32F")
         fill_elements(entries, 0, count * texels_each, -1.0)
 
-        def trace(start: int, number: int) -> None:
-            shader = self._tracer(textures, glossy, found)
-            shader.image("entries", entries)
+        def run(shader: gpu.types.GPUShader, start: int, number: int) -> None:
+            self._scene.bind_surfaces(shader)
+            self._scene.bind_gloss(shader)
+            self._scene.bind_sheets(shader)
+            shader.uniform_sampler("geometry", textures["geometry"])
+            shader.uniform_sampler("glossy", glossy)
             shader.uniform_sampler("probe_slots", probe_slots)
-            shader.uniform_sampler("world_texels", world_texels)
+            shader.image("carried", found.carried)
             where = ("first_slot", first_slot), ("first_layer", first), ("first", start), ("count", number)
             for name, value in (*where, ("seed", seed)):
                 shader.uniform_int(name, (value,))
             dispatch_linear(shader, number)
 
+        def look(start: int, number: int) -> None:
+            shader = self._program("texel_lamps_comp", HAS_EMITTERS=False)
+            self._scene.bind_lamps(shader)
+            run(shader, start, number)
+
+        def trace(start: int, number: int) -> None:
+            shader = self._program("texel_reflections_comp")
+            self._scene.bind_mirrored_lights(shader)
+            shader.uniform_sampler("world_texels", world_texels)
+            shader.image("albedo", textures["albedo"])
+            shader.image("entries", entries)
+            for name in ("hits", "reflected"):
+                shader.image(name, getattr(found, name))
+            if found.sheets is not None:
+                shader.image("hit_sheets", found.sheets)
+            run(shader, start, number)
+
+        yield from pace.portions("look", found.count, look, first=1024)
         yield from pace.portions("reflect", found.count, trace, first=1024)
         ends = entries
         if found.count:
@@ -119,20 +140,8 @@ class GlossPass:
             gpu.compute.dispatch(shader, groups, 1, 1)
         return listed, _Found(read_number(total), self._scene.has_sheets)
 
-    def _tracer(self, textures: dict, glossy: gpu.types.GPUTexture, found: _Found):
-        scene = self._scene
-        shader = program("texel_reflections_comp", FACE=self._face, **scene.path_defines)
-        scene.bind_surfaces(shader)
-        scene.bind_sheets(shader)
-        scene.bind_gloss(shader, lights=True)
-        shader.uniform_sampler("geometry", textures["geometry"])
-        shader.uniform_sampler("glossy", glossy)
-        shader.image("albedo", textures["albedo"])
-        for name in ("hits", "reflected", "carried"):
-            shader.image(name, getattr(found, name))
-        if found.sheets is not None:
-            shader.image("hit_sheets", found.sheets)
-        return shader
+    def _program(self, name: str, **defines):
+        return program(name, FACE=self._face, **(self._scene.path_defines | defines))
 
 
 class _Found:

@@ -211,8 +211,7 @@ class PatchLight:
     def _bind_ray_scene(self, rays: Rays):
         """The shader that traces ``rays``, with what it reads of the scene bound: lamps only where rays are lit."""
         scene, is_path = self._scene, rays.segments > 1
-        is_lit = is_path or scene.has_gloss
-        defines = scene.path_defines if is_lit else scene.surface_defines | scene.sheet_defines
+        defines = scene.path_defines if is_path or scene.has_gloss else scene.surface_defines | scene.sheet_defines
         defines = defines | rays.places.defines
         shader = program(
             "patch_rays_comp", FACE=self._settings.face, POINTS=rays.places.each, SEGMENTS=rays.segments, **defines
@@ -220,7 +219,9 @@ class PatchLight:
         scene.bind_surfaces(shader)
         if is_path:
             scene.bind_lights(shader)
-        scene.bind_gloss(shader, lights=not is_path)
+        elif scene.has_gloss:
+            scene.bind_mirrored_lights(shader)
+        scene.bind_gloss(shader)
         scene.bind_sheets(shader, rays.places.sheets)
         rays.places.bind_couplings(shader)
         return shader

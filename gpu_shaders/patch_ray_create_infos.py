@@ -17,7 +17,7 @@ from .create_infos import (
     _sheet_files,
     _sheets,
 )
-from .gloss_create_infos import gloss, gloss_files
+from .gloss_create_infos import gloss, path_files
 
 
 def patch_rays_comp(info, defines):
@@ -48,7 +48,7 @@ def patch_rays_comp(info, defines):
                 if lights_points
                 else ("random_lib", "surface_lib", "offset_lib", "ray_lib")
             ),
-            *gloss_files(defines),
+            *path_files(defines),
             *_sheet_files(defines),
             "patch_rays_comp",
         ]

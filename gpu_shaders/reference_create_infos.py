@@ -14,7 +14,7 @@ from .create_infos import (
     _sheet_files,
     _sheets,
 )
-from .gloss_create_infos import gloss, gloss_files, highlight_numbers
+from .gloss_create_infos import gloss, highlight_numbers, path_files
 
 
 def probe_paths_comp(info, defines):
@@ -33,7 +33,7 @@ def probe_paths_comp(info, defines):
         info, "path_count", "probe_count", "paths_each", "first_number", "light_count", "first_sun", "bounces", "seed"
     )
     info.local_group_size(64, 1, 1)
-    files = [*_light_files(defines | {"HAS_ALPHA": True}), *gloss_files(defines), *_sheet_files(defines)]
+    files = [*_light_files(defines | {"HAS_ALPHA": True}), *path_files(defines), *_sheet_files(defines)]
     return {
         "compute": [
             "data_lib",

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from .create_infos import NO_SURFACE, _image, _ints, _samplers, _scene
-from .gloss_create_infos import gloss, gloss_files
+from .gloss_create_infos import gloss
 
 
 def probe_reach_comp(info, defines):
@@ -35,7 +35,7 @@ def surface_again_comp(info, defines):
     _image(info, 3, "rebind", pixel="R32F")
     _ints(info, "first_slot")
     info.local_group_size(8, 8, 1)
-    gloss_lib = ["random_lib", *gloss_files(defines, rays=False)] if "HAS_GLOSS" in defines else []
+    gloss_lib = ["random_lib", "gloss_lib"] if "HAS_GLOSS" in defines else []
     files = ["surface_lib", "offset_lib", "ray_lib", *gloss_lib, "surface_again_comp"]
     return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *files]}
 

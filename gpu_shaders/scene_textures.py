@@ -245,17 +245,17 @@ class SceneTextures:
         """For shaders that follow mirrored light or ask what is glossy."""
         return {"HAS_GLOSS": self.has_gloss}
 
-    def bind_gloss(self, shader, lights: bool = False) -> None:
-        """Binds what a shader compiled with ``gloss_defines`` declares beside surfaces; with ``lights`` also lamps and
-        emitters, for one that sees them mirrored and lights no points."""
-        if not self.has_gloss:
-            return
-        self.bind(shader, "gloss_rows")
-        if lights:
-            self.bind(shader, "lights")
-            shader.uniform_int("light_count", (self.lamp_count,))
-            if self.emitter_count:
-                self.bind_emitters(shader)
+    def bind_gloss(self, shader) -> None:
+        """Binds what a shader compiled with ``gloss_defines`` declares beside surfaces and lights."""
+        if self.has_gloss:
+            self.bind(shader, "gloss_rows")
+
+    def bind_mirrored_lights(self, shader) -> None:
+        """Binds the lamps and sampled emitters of a shader that sees them mirrored and lights no diffuse points."""
+        self.bind(shader, "lights")
+        shader.uniform_int("light_count", (self.lamp_count,))
+        if self.emitter_count:
+            self.bind_emitters(shader)
 
     def bind_sheets(self, shader, numbers=None) -> None:
         """Binds what a shader compiled with ``sheet_defines`` declares; ``numbers``: sheets of patches or texels."""

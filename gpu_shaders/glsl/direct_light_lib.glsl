@@ -200,15 +200,15 @@ vec3 unshadowed_irradiance(int light, LightSample light_sample, vec3 normal)
 #endif
 }
 
-/* The share of it that arrives, by a shadow ray. */
-vec3 light_arriving(int light, LightSample light_sample, vec3 origin)
+/* The ray to a sample of a light that `brings` so much. */
+ShadowRay ray_to_light(int light, LightSample light_sample, vec3 origin, vec3 brings)
 {
   int group = 0;
 #ifdef HAS_LINKS
   group = group_of_light(light);
 #endif
   bool shadow = (int(element(lights, 6 * light + 4).w) & 1) != 0;
-  return shadow ? light_along(origin, light_sample.direction, light_sample.distance * 0.9999, group) : vec3(1.0);
+  return ShadowRay(origin, light_sample.direction, shadow ? light_sample.distance * 0.9999 : 0.0, group, brings);
 }
 
 /* For lights `first` .. `stop`: the place on each of them, and which one is chosen. */
@@ -218,11 +218,10 @@ vec3 numbers_of_lights(int first, int stop, uvec3 key, int index)
   return stop - first > 1 ? sample_r3(own_key, index) : vec3(sample_r2(own_key, index), 0.0);
 }
 
-/* Irradiance of lights `first` .. `stop`: one shadow ray to one of them, chosen by what each sends if nothing stands
- * between (Talbot, Cline and Egbert, "Importance Resampling for Global Illumination", EGSR 2005, with every light a
- * candidate). `direction`: to that one. */
-vec3 lights_irradiance(
-    int first, int stop, vec3 point, vec3 origin, vec3 normal, uvec3 key, int index, out vec3 direction)
+/* Irradiance of lights `first` .. `stop`: the ray to one of them, chosen by what each sends if nothing stands between
+ * (Talbot, Cline and Egbert, "Importance Resampling for Global Illumination", EGSR 2005, with every light a
+ * candidate). */
+ShadowRay ray_to_lights(int first, int stop, vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
 {
   vec3 numbers = numbers_of_lights(first, stop, key, index);
   float choice = numbers.z;
@@ -241,22 +240,28 @@ vec3 lights_irradiance(
       best = light;
     }
   }
-  direction = best_sample.direction;
-  return best < 0 ? vec3(0.0) : best_irradiance * (total / best_weight) * light_arriving(best, best_sample, origin);
+  if (best < 0) {
+    return NO_SHADOW_RAY;
+  }
+  return ray_to_light(best, best_sample, origin, best_irradiance * (total / best_weight));
 }
 
-/* Irradiance of all lamps: sample `index` of the sequences of `key`. LAMPS_A_RAY neighbours share a shadow ray. */
-vec3 lamps_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
+/* Shadow rays that irradiance by all lamps takes: LAMPS_A_RAY neighbours share one. */
+int lamp_rays()
 {
   int lamps_each = LAMPS_A_RAY;
-  vec3 sum = vec3(0.0), direction;
-  for (int first = FIRST_LIGHT; first < light_count; first += lamps_each) {
-    sum += lights_irradiance(first, min(first + lamps_each, light_count), point, origin, normal, key, index, direction);
-  }
-  return sum;
+  return (light_count - FIRST_LIGHT + lamps_each - 1) / lamps_each;
 }
 
-/* The same if nothing stood between. */
+/* One of them: sample `index` of the sequences of `key`. */
+ShadowRay lamp_ray(int number, vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
+{
+  int lamps_each = LAMPS_A_RAY;
+  int first = FIRST_LIGHT + number * lamps_each;
+  return ray_to_lights(first, min(first + lamps_each, light_count), point, origin, normal, key, index);
+}
+
+/* Irradiance by all lamps if nothing stood between. */
 vec3 lamps_unshadowed(vec3 point, vec3 normal, uvec3 key, int index)
 {
   int lamps_each = LAMPS_A_RAY;

@@ -100,10 +100,18 @@ float point_share(int group, float density, float distance, float surface_cosine
   return point_density / (point_density + surface_cosine * emitter_cosine * 0.3183098861837907);
 }
 
-/* Irradiance by points on emitters, one shadow ray, `towards` one of them: sample `index` of the sequence of `key`. */
-vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index, out vec3 towards)
+/* The ray to a point on an emitter that `brings` so much. From where it starts, which is off the surface: to an emitter a
+ * few centimetres away it would be too long otherwise and meet the emitter itself. */
+ShadowRay ray_to_emitter(vec3 point, vec3 origin, int group, vec3 brings)
 {
-  towards = normal;
+  vec3 way = point - origin;
+  float way_length = max(length(way), 1.0e-20);
+  return ShadowRay(origin, way / way_length, way_length * 0.9999, group, brings);
+}
+
+/* Irradiance by points on emitters, the ray to one of them: sample `index` of the sequence of `key`. */
+ShadowRay ray_to_emitters(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
+{
   vec3 best_irradiance = vec3(0.0), best_point = vec3(0.0);
   int best_group = 0;
   float best_weight = 0.0, total = 0.0;
@@ -131,15 +139,9 @@ vec3 emitter_points_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, 
     }
   }
   if (best_weight == 0.0) {
-    return vec3(0.0);
+    return NO_SHADOW_RAY;
   }
-  /* From where the ray starts, which is not `point`: to an emitter a few centimetres away it would be too long and meet
-   * the emitter itself. */
-  vec3 way = best_point - origin;
-  float way_length = max(length(way), 1.0e-20);
-  towards = way / way_length;
-  vec3 arriving = light_along(origin, towards, way_length * 0.9999, best_group);
-  return best_irradiance * (total / (best_weight * float(CANDIDATES))) * arriving;
+  return ray_to_emitter(best_point, origin, best_group, best_irradiance * (total / (best_weight * float(CANDIDATES))));
 }
 
 bool is_emitter_in_reach(vec3 point)
@@ -154,47 +156,42 @@ bool is_emitter_in_reach(vec3 point)
   return false;
 }
 
-/* Irradiance by a `direction` about the normal that finds an emitter within emitter_reach. */
-vec3 emitter_direction_irradiance(vec3 origin, vec3 normal, uvec3 key, int index, out vec3 direction)
+/* Share of the emission of what a ray in a `direction` about the normal has hit that directions answer for. */
+float direction_share(Hit hit, float density, vec3 direction, float surface_cosine)
 {
-  direction = normal;
-  if (!is_emitter_in_reach(origin)) {
-    return vec3(0.0);
-  }
-  direction = sample_cosine(normal, sample_r2(key + uvec3(0u, 0x3C6EF372u, 0u), index));
-  Hit hit = trace_within(origin, direction, emitter_reach);
-  if (hit.triangle < 0) {
-    return vec3(0.0);
-  }
-  float density = element(triangle_attributes, 5 * hit.triangle + 4).z;
-  if (density == 0.0) {
-    return vec3(0.0);
-  }
   int group = 0;
 #ifdef HAS_LINKS
   group = group_of_triangle(hit.triangle);
   if (!falls_on(group, lit_role)) {
-    return vec3(0.0);
+    return 0.0;
   }
 #endif
   vec3 a = element(triangle_corners, 3 * hit.triangle).xyz;
   vec3 across = cross(element(triangle_corners, 3 * hit.triangle + 1).xyz - a,
                       element(triangle_corners, 3 * hit.triangle + 2).xyz - a);
-  float share = point_share(
-      group, density, hit.distance, dot(direction, normal), abs(dot(direction, normalize(across))));
-  vec3 arriving = passed_to(origin, direction, hit.distance);
-#ifdef HAS_COUPLING
-  arriving *= coupled(dot(direction, normal));
-#endif
-  return emitter_radiance(hit.triangle, hit.barycentric) * ((1.0 - share) * 3.141592653589793) * arriving;
+  return 1.0 - point_share(group, density, hit.distance, surface_cosine, abs(dot(direction, normalize(across))));
 }
 
-/* Irradiance of all sampled emitters at a surface: sample `index` of the sequences of `key`. */
-vec3 emitter_irradiance(vec3 point, vec3 origin, vec3 normal, uvec3 key, int index)
+/* Irradiance by a direction about the normal that finds an emitter within emitter_reach: sample `index` of the sequence
+ * of `key`. */
+vec3 emitter_direction_irradiance(vec3 origin, vec3 normal, uvec3 key, int index)
 {
-  vec3 direction;
-  vec3 by_points = emitter_points_irradiance(point, origin, normal, key, index, direction);
-  return by_points + emitter_direction_irradiance(origin, normal, key, index, direction);
+  if (!is_emitter_in_reach(origin)) {
+    return vec3(0.0);
+  }
+  vec3 direction = sample_cosine(normal, sample_r2(key + uvec3(0u, 0x3C6EF372u, 0u), index));
+  Hit hit = trace_within(origin, direction, emitter_reach);
+  float density = hit.triangle < 0 ? 0.0 : element(triangle_attributes, 5 * hit.triangle + 4).z;
+  if (density == 0.0) {
+    return vec3(0.0);
+  }
+  float surface_cosine = dot(direction, normal);
+  vec3 arriving = direction_share(hit, density, direction, surface_cosine) *
+                  passed_to(origin, direction, hit.distance);
+#ifdef HAS_COUPLING
+  arriving *= coupled(surface_cosine);
+#endif
+  return emitter_radiance(hit.triangle, hit.barycentric) * 3.141592653589793 * arriving;
 }
 
 /* Irradiance by one candidate if nothing stood between: candidate `index` of the sequence of `key`. */

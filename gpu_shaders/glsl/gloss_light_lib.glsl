@@ -129,25 +129,6 @@ vec3 lamp_in_gloss(int light, Gloss gloss, Surface surface, vec3 view, float wid
          share_of_points_on(lamp_extent(light, surface.position), width);
 }
 
-/* The same by all lamps, with their shadows. */
-vec3 lamps_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float width, uvec3 key, int index)
-{
-  vec3 sum = vec3(0.0);
-  for (int light = 0; light < light_count; light++) {
-#ifdef HAS_LINKS
-    if (!falls_on(group_of_light(light), lit_role)) {
-      continue;
-    }
-#endif
-    LightSample light_sample;
-    vec3 radiance = lamp_in_gloss(light, gloss, surface, view, width, key, index, light_sample);
-    if (radiance != vec3(0.0)) {
-      sum += radiance * light_arriving(light, light_sample, origin);
-    }
-  }
-  return sum;
-}
-
 #ifdef HAS_EMITTERS
 /* Steradians that each of CANDIDATES points on an emitter of the `group` stands for; 0 where points answer for all, as
  * light of the group passes surfaces, at which rays end. */
@@ -161,8 +142,9 @@ float emitter_extent(int group, float density, float distance, float emitter_cos
   return emitter_cosine / (float(CANDIDATES) * density * distance * distance);
 }
 
-/* The same by points on sampled emitters, of which one gets a ray: as emitter_points_irradiance. */
-vec3 emitters_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float width, uvec3 key, int index)
+/* The same by points on sampled emitters, of which one gets a ray: as ray_to_emitters. */
+ShadowRay ray_to_emitters_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float width, uvec3 key,
+                                   int index)
 {
   vec3 best_radiance = vec3(0.0), best_point = vec3(0.0);
   int best_group = 0;
@@ -179,36 +161,48 @@ vec3 emitters_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, flo
                     (cosine / (squared * emitter.density) *
                      share_of_points_on(emitter_extent(emitter.group, emitter.density, distance, cosine), width));
     float weight = radiance.r + radiance.g + radiance.b;
-    total += weight;
-    if (weight > 0.0 && choice * total < weight) {
-      choice = choice * total / weight;
+    if (takes(weight, choice, total)) {
       best_radiance = radiance;
       best_point = emitter.point;
       best_group = emitter.group;
       best_weight = weight;
     }
-    else if (total > weight) {
-      choice = (choice * total - weight) / (total - weight);
-    }
   }
-  vec3 way = best_point - origin;
-  float way_length = max(length(way), 1.0e-20);
   if (best_weight == 0.0) {
-    return vec3(0.0);
+    return NO_SHADOW_RAY;
   }
-  vec3 arriving = light_along(origin, way / way_length, way_length * 0.9999, best_group);
-  return best_radiance * (total / (best_weight * float(CANDIDATES))) * arriving;
+  return ray_to_emitter(best_point, origin, best_group, best_radiance * (total / (best_weight * float(CANDIDATES))));
 }
 #endif
 
-vec3 light_in_gloss(Gloss gloss, Surface surface, vec3 origin, vec3 view, float width, uvec3 event)
+/* Shadow rays that light of points on lamps and emitters takes: one to each lamp, one to all emitters. */
+int gloss_light_rays()
 {
-  uvec3 key = event + uvec3(0u, LIGHT_STREAM, 0u);
-  vec3 radiance = lamps_in_gloss(gloss, surface, origin, view, width, key, 0);
 #ifdef HAS_EMITTERS
-  radiance += emitters_in_gloss(gloss, surface, origin, view, width, key + uvec3(0u, 0u, 0x2545F491u), 0);
+  return light_count + 1;
+#else
+  return light_count;
 #endif
-  return radiance;
+}
+
+/* One of them, with the radiance that the surface sends to `view`: sample `index` of the sequences of `key`. */
+ShadowRay gloss_light_ray(int number, Gloss gloss, Surface surface, vec3 origin, vec3 view, float width, uvec3 key,
+                          int index)
+{
+#ifdef HAS_EMITTERS
+  if (number == light_count) {
+    uvec3 emitter_key = key + uvec3(0u, 0u, 0x2545F491u);
+    return ray_to_emitters_in_gloss(gloss, surface, origin, view, width, emitter_key, index);
+  }
+#endif
+#ifdef HAS_LINKS
+  if (!falls_on(group_of_light(number), lit_role)) {
+    return NO_SHADOW_RAY;
+  }
+#endif
+  LightSample light_sample;
+  vec3 radiance = lamp_in_gloss(number, gloss, surface, view, width, key, index, light_sample);
+  return ray_to_light(number, light_sample, origin, radiance);
 }
 
 /* Of the emission that a mirrored ray meets, the share that rays answer for. */

@@ -11,12 +11,18 @@
  * couplings: of each patch, see coupling_lib.
  */
 
+/* Drivers that unroll its loops compile this for twice as long, and run it no faster. */
+#pragma optionNV(unroll none)
+
 vec3 irradiance_of_side(vec3 point, vec3 normal, uvec3 key, int index)
 {
-  vec3 origin = leave_surface(point, normal);
-  vec3 irradiance = lamps_irradiance(point, origin, normal, key, index);
+  vec3 origin = leave_surface(point, normal), irradiance = vec3(0.0);
+  uvec3 emitter_key = key + uvec3(0u, 0u, 0x2545F491u);
+  for (int ray = 0; ray < light_rays(); ray++) {
+    irradiance += brought_by(light_ray(ray, point, origin, normal, key, emitter_key, index));
+  }
 #ifdef HAS_EMITTERS
-  irradiance += emitter_irradiance(point, origin, normal, key + uvec3(0u, 0u, 0x2545F491u), index);
+  irradiance += emitter_direction_irradiance(origin, normal, emitter_key, index);
 #endif
   return irradiance;
 }
@@ -50,9 +56,10 @@ void main()
     vec3 normal = unpack_normal(at.w);
 #ifdef HAS_SHEETS
     vec3 through = share_of_back(int(element(sheet_numbers, patch_index).x));
-    irradiance += (1.0 - through) * irradiance_of_side(at.xyz, normal, key, i);
-    if (through != vec3(0.0)) {
-      irradiance += through * irradiance_of_side(at.xyz, -normal, key + uvec3(0u, BACK_STREAM, 0u), i);
+    for (int side = 0; side < (through == vec3(0.0) ? 1 : 2); side++) {
+      uvec3 side_key = key + uvec3(0u, side == 0 ? 0u : BACK_STREAM, 0u);
+      vec3 of_side = irradiance_of_side(at.xyz, side == 0 ? normal : -normal, side_key, i);
+      irradiance += (side == 0 ? 1.0 - through : through) * of_side;
     }
 #else
     irradiance += irradiance_of_side(at.xyz, normal, key, i);

@@ -8,6 +8,9 @@
  * deviation of the luminance of one sample's irradiance.
  */
 
+/* Drivers that unroll its loops compile this for twice as long, and run it no faster. */
+#pragma optionNV(unroll none)
+
 const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
 
 /* `share`: by which the light of this side counts. Adds to `variance` what candidates differ by. */
@@ -18,8 +21,7 @@ float luminance_of_side(vec3 point, vec3 normal, uvec3 key, int index, float sha
   float one = share * dot(emitter_unshadowed(point, normal, key, 2 * index), LUMINANCE);
   float other = share * dot(emitter_unshadowed(point, normal, key, 2 * index + 1), LUMINANCE);
   luminance += 0.5 * (one + other);
-  vec3 direction;
-  vec3 near = emitter_direction_irradiance(leave_surface(point, normal), normal, key, index, direction);
+  vec3 near = emitter_direction_irradiance(leave_surface(point, normal), normal, key, index);
   luminance += share * dot(near, LUMINANCE);
   variance += 0.5 * (one - other) * (one - other) / float(point_count);
 #endif

@@ -7,8 +7,11 @@
  * for both kinds of step otherwise. The triangle test is watertight: Woop, Benthin and Wald, "Watertight Ray/Triangle
  * Intersection", JCGT 2013. Both sides of a triangle are hit. With HAS_ALPHA, triangles of clipped materials ask
  * surface_lib's `is_hole` first; with HAS_UNSEEN, rays pass triangles that their kind does not see; with HAS_LINKS,
- * shadow rays to an emitter those that are none of its blockers. With HAS_TINT holes may be coloured: what hits or
- * misses is the same, and what light has passed is asked afterwards.
+ * shadow rays to an emitter those that are none of its blockers. With HAS_TINT holes may be coloured: shadow rays bring
+ * along what those leave, of other rays it is asked afterwards.
+ *
+ * Drivers put a copy of this code wherever a ray is traced, and some compile a program with eight of them for a minute
+ * (docs/history.md): shaders trace all shadow rays of a place in one loop, and all others in another.
  *
  * Samplers: bvh_nodes, triangle_corners.
  */
@@ -196,6 +199,22 @@ bool intersect_triangle(Ray ray, int index, int unseen, inout Hit hit)
     float swap_child = child[i]; child[i] = child[j]; child[j] = swap_child; \
   }
 
+/* Loops over a node's children are written out: where drivers are told to unroll nothing, indices that are not constant
+ * would put vectors into memory. */
+#ifdef LEAN_STACK
+#  define KEEP_FOR_LATER(i) \
+  if (entry[i] < NO_HIT) { \
+    stack[top++] = int(child[i]); \
+  }
+#else
+#  define KEEP_FOR_LATER(i) \
+  if (entry[i] < NO_HIT) { \
+    stack[top] = int(child[i]); \
+    stack_entry[top] = entry[i]; \
+    top++; \
+  }
+#endif
+
 /* The nearest of what is left becomes `item`; without any the ray ends. With LEAN_STACK the stack does not know how far
  * away things are, and what lies behind the hit is found out when it is looked at: GPUs have stacks in memory and gain
  * by half the traffic, software drivers lose half their speed. */
@@ -232,15 +251,7 @@ Hit trace_nearest(vec3 origin, vec3 direction, float limit, int unseen)
       vec4 entry = enter_boxes(ray, item, hit.distance);
       vec4 child = element(bvh_nodes, item * 7 + 6);
       ORDER(0, 1) ORDER(2, 3) ORDER(0, 2) ORDER(1, 3) ORDER(1, 2)
-      for (int i = 3; i >= 1; i--) {
-        if (entry[i] < NO_HIT) {
-          stack[top] = int(child[i]);
-#ifndef LEAN_STACK
-          stack_entry[top] = entry[i];
-#endif
-          top++;
-        }
-      }
+      KEEP_FOR_LATER(3) KEEP_FOR_LATER(2) KEEP_FOR_LATER(1)
       if (entry[0] < NO_HIT) {
         item = int(child[0]);
       }
@@ -272,20 +283,21 @@ Hit trace_view(vec3 origin, vec3 direction)
   return trace_nearest(origin, direction, NO_HIT, UNSEEN_BY_CAMERA);
 }
 
+#define ENTER(i) \
+  if (entry[i] < NO_HIT) { \
+    if (item != NO_NODE) { \
+      stack[top++] = item; \
+    } \
+    item = int(child[i]); \
+  }
+
 /* Down to a leaf, in any order; where nothing is left the function ends with `result`. */
 #define GO_DOWN(result) \
   while (item >= 0) { \
     vec4 entry = enter_boxes(ray, item, limit); \
     vec4 child = element(bvh_nodes, item * 7 + 6); \
     item = NO_NODE; \
-    for (int i = 0; i < 4; i++) { \
-      if (entry[i] < NO_HIT) { \
-        if (item != NO_NODE) { \
-          stack[top++] = item; \
-        } \
-        item = int(child[i]); \
-      } \
-    } \
+    ENTER(0) ENTER(1) ENTER(2) ENTER(3) \
     if (item == NO_NODE) { \
       if (top == 0) { \
         return result; \
@@ -331,9 +343,9 @@ bool trace_any(vec3 origin, vec3 direction, float limit)
 }
 
 #ifdef HAS_TINT
-/* What coloured holes nearer than `limit` leave of light along a ray that is of the kind `unseen` and hits nothing else
- * before. */
-vec3 tint_along(vec3 origin, vec3 direction, float limit, int unseen)
+/* What a ray that is of the kind `unseen` brings along of light from `limit` away: nothing where it hits anything
+ * nearer, else what coloured holes leave. */
+vec3 passage(vec3 origin, vec3 direction, float limit, int unseen)
 {
   Ray ray = make_ray(origin, direction);
   vec3 tint = vec3(1.0);
@@ -343,19 +355,26 @@ vec3 tint_along(vec3 origin, vec3 direction, float limit, int unseen)
   while (true) {
     GO_DOWN(tint)
     int index = -1 - item;
-    bool ends = false;
-    while (!ends) {
+    bool ends = false, blocks = false;
+    while (!ends && !blocks) {
       vec4 corner = element(triangle_corners, 3 * index);
       vec4 corner1 = element(triangle_corners, 3 * index + 1);
       vec4 corner2 = element(triangle_corners, 3 * index + 2);
       float distance;
       vec2 barycentric;
-      if ((int(corner1.w) & TINTED) != 0 && meets(ray, corner, corner1, corner2, limit, distance, barycentric) &&
-          !is_unseen(ray, corner, corner1, corner2, unseen) && is_hole(index, barycentric)) {
-        tint *= hole_tint(index, barycentric);
+      if (meets(ray, corner, corner1, corner2, limit, distance, barycentric) &&
+          !is_unseen(ray, corner, corner1, corner2, unseen)) {
+        int flags = int(corner1.w);
+        blocks = (flags & CLIPPED) == 0 || !is_hole(index, barycentric);
+        if (!blocks && (flags & TINTED) != 0) {
+          tint *= hole_tint(index, barycentric);
+        }
       }
       ends = corner.w != 0.0;
       index++;
+    }
+    if (blocks) {
+      return vec3(0.0);
     }
     if (top == 0) {
       return tint;
@@ -369,7 +388,7 @@ vec3 tint_along(vec3 origin, vec3 direction, float limit, int unseen)
 vec3 passed_to(vec3 origin, vec3 direction, float limit)
 {
 #ifdef HAS_TINT
-  return tint_along(origin, direction, limit, UNSEEN_BY_DIFFUSE_RAYS);
+  return passage(origin, direction, limit, UNSEEN_BY_DIFFUSE_RAYS);
 #else
   return vec3(1.0);
 #endif
@@ -378,12 +397,27 @@ vec3 passed_to(vec3 origin, vec3 direction, float limit)
 /* What arrives along a ray to an emitter of a group of light linking, `limit` away. */
 vec3 light_along(vec3 origin, vec3 direction, float limit, int group)
 {
-  if (trace_blockers(origin, direction, limit, group)) {
-    return vec3(0.0);
-  }
 #ifdef HAS_TINT
-  return tint_along(origin, direction, limit, UNSEEN_BY_SHADOW_RAYS | (group << ROLE_SHIFT));
+  return passage(origin, direction, limit, UNSEEN_BY_SHADOW_RAYS | (group << ROLE_SHIFT));
 #else
-  return vec3(1.0);
+  return trace_blockers(origin, direction, limit, group) ? vec3(0.0) : vec3(1.0);
 #endif
+}
+
+/* A ray to a light, and what comes along it if nothing stands between. */
+struct ShadowRay {
+  vec3 origin;
+  vec3 direction;
+  float limit; /* 0 to lights without shadows */
+  int group;   /* of light linking; 0 without HAS_LINKS */
+  vec3 brings;
+};
+
+const ShadowRay NO_SHADOW_RAY = ShadowRay(vec3(0.0), vec3(0.0, 0.0, 1.0), 0.0, 0, vec3(0.0));
+
+/* What comes along it. */
+vec3 brought_by(ShadowRay ray)
+{
+  bool asks = ray.limit > 0.0 && ray.brings != vec3(0.0);
+  return asks ? ray.brings * light_along(ray.origin, ray.direction, ray.limit, ray.group) : ray.brings;
 }

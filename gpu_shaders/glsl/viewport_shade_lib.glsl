@@ -7,15 +7,14 @@ vec3 lamps_radiance(Surface surface, vec3 direction, vec3 origin, uvec3 key, int
   vec3 mirrored = reflect(direction, surface.normal);
   float exponent = shade_info[1].z;
   float highlight = shade_info[1].y * (exponent + 2.0) * 0.15915494309189535;
-  int lamps_each = LAMPS_A_RAY;
-  vec3 sum = vec3(0.0), towards;
-  for (int first = 0; first < light_count; first += lamps_each) {
-    int stop = min(first + lamps_each, light_count);
-    vec3 irradiance = lights_irradiance(first, stop, surface.position, origin, surface.normal, key, index, towards);
+  vec3 sum = vec3(0.0);
+  for (int number = 0; number < lamp_rays(); number++) {
+    ShadowRay ray = lamp_ray(number, surface.position, origin, surface.normal, key, index);
+    vec3 irradiance = brought_by(ray);
     if (irradiance != vec3(0.0)) {
       vec3 reflected = surface.albedo * 0.3183098861837907;
       if (highlight > 0.0) {
-        reflected += highlight * pow(max(dot(mirrored, towards), 0.0), exponent);
+        reflected += highlight * pow(max(dot(mirrored, ray.direction), 0.0), exponent);
       }
       sum += reflected * irradiance;
     }
