@@ -304,8 +304,8 @@ class ReferenceLight:
         )
 
     def _at_bounces(self, position, facing, direction, distance, sheet, keys, index, role, coupling) -> np.ndarray:
-        """(C, 3) direct irradiance where rays have met surface, (C, …) each, from both sides of sheets. Of emitters what
-        points answer for: the ray that goes on from there finds the rest."""
+        """(C, 3) direct irradiance where rays have met surface, (C, …) each, from both sides of sheets. Of emitters
+        what points answer for: the ray that goes on from there finds the rest."""
         arriving = np.zeros((len(position), 3))
         for side, normals, side_keys, share in self._sides(facing, keys, np.arange(len(position)), sheet):
             towards = np.where((normals * facing[side]).sum(axis=1, keepdims=True) > 0, -1, 1)
