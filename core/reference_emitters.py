@@ -147,6 +147,8 @@ class ReferenceEmitters:
     def by_points(self, points, origins, normals, keys, index, role, coupling=None) -> np.ndarray:
         """The part of ``irradiance`` that points answer for. Resampled: CANDIDATES points by power, one of them by what
         it would send if nothing stood between; a single number chooses among them one after the other."""
+        if not self.count:
+            return np.zeros_like(points)
         choice = WeightedChoice(sample_r3(shifted(keys, _CHOICE_STREAM, 0, 0), index)[:, 0])
         best = _Arrival(np.zeros_like(points), np.zeros_like(points), np.zeros(len(points), int))
         for candidate in range(CANDIDATES):

@@ -50,9 +50,8 @@ from .world_map import world_texels
 from .world_suns import extract_suns
 
 _RAISE = 0.15  # of the distance between hit and leader: both ends of a line of sight are raised by it
-_RAY_STREAM, _PATH_LIGHT_STREAM = 0x85EBCA6B, 0x1B873593
-_EMITTER_STREAM, _PLACE_STREAM = 0x2545F491, 0x85EBCA6B
-_BACK_STREAM, _SIDE_STREAM = 0x51ED2705, 0x6C8E9CF5
+_RAY_STREAM, _PATH_LIGHT_STREAM, _EMITTER_STREAM = 0x85EBCA6B, 0x1B873593, 0x2545F491
+_PLACE_STREAM, _BACK_STREAM, _SIDE_STREAM = 0x85EBCA6B, 0x51ED2705, 0x6C8E9CF5
 _RAY_SPREAD = 0.5  # radians: rays between patches see images blurred
 
 
@@ -262,12 +261,12 @@ class ReferenceLight:
             surface = self.scene.resolve(found, direction, _RAY_SPREAD)
             missed = found.triangle < 0
             reflected[alive] *= self.scene.tint(origin[alive], direction, found.distance, DIFFUSE_RAYS)
-            lit = self.scene.falls_on(self.scene.links.group[self.scene.role[found.triangle]], role[alive])
-            share = np.where(lit & (self.emitters.density[found.triangle] == 0), 1.0, 0.0)
+            group, sampled = self.scene.links.group[self.scene.role[found.triangle]], self.emitters.density > 0
+            share = np.where(sampled[found.triangle], 0.0, self.scene.falls_on(group, role[alive]))
             if segment > 0:
                 share += self.emitters.direction_share(found, direction, cosine, role[alive])
-            emission = surface.emission * share[:, None]
-            carried[alive] += reflected[alive] * np.where(missed[:, None], self.background(direction), emission)
+            sent = np.where(missed[:, None], self.background(direction), surface.emission * share[:, None])
+            carried[alive] += reflected[alive] * sent
             position = origin[alive] + direction * np.where(missed, 0.0, found.distance)[:, None]
             ways = Ways(direction, surface, position, reflected[alive], carried[alive])
             first = MOST_REFLECTIONS * segment
@@ -311,9 +310,7 @@ class ReferenceLight:
             towards = np.where((normals * facing[side]).sum(axis=1, keepdims=True) > 0, -1, 1)
             start = step_off(position[side], normals, towards * direction[side], distance[side])
             how = position[side], start, normals, side_keys, index[side], role[side], coupling[side]
-            arriving[side] += share * self._lamps.irradiance(*how)
-            if self.emitters.count:
-                arriving[side] += share * self.emitters.by_points(*how)
+            arriving[side] += share * (self._lamps.irradiance(*how) + self.emitters.by_points(*how))
         return arriving
 
     def connect(self) -> None:

@@ -16,6 +16,7 @@ from ..core.images import HALF_MAX
 from ..core.patches import SLOW
 
 NO_SURFACE = "1.0e30"
+RAY_FILES = ("offset_lib", "ray_lib", "passage_lib")  # what it takes to know what comes along a ray
 # What shaders begin with that sum up a probe's texels.
 _PROBE_FILES = ("data_lib", "octahedral_lib", "cubemap_lib", "spherical_harmonics_lib", "group_sum_lib")
 
@@ -117,17 +118,8 @@ def capture_trace_comp(info, defines):
     _image(info, 0, "hits", layered=True)
     _ints(info, "first_slot")
     info.local_group_size(8, 8, 1)
-    return {
-        "compute": [
-            "data_lib",
-            "octahedral_lib",
-            "cubemap_lib",
-            *_surface_files(defines),
-            "offset_lib",
-            "ray_lib",
-            "capture_trace_comp",
-        ]
-    }
+    files = [*_surface_files(defines), "offset_lib", "ray_lib", "capture_trace_comp"]
+    return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *files]}
 
 
 def capture_raster(info, defines):
@@ -161,7 +153,7 @@ def surface_resolve_comp(info, defines):
     _image(info, 2, "emission", layered=True)
     _ints(info, "first_slot", "first_layer")
     info.local_group_size(8, 8, 1)
-    files = ["surface_lib", "offset_lib", "ray_lib", "surface_resolve_comp"]
+    files = ["surface_lib", *RAY_FILES, "surface_resolve_comp"]
     return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *files]}
 
 
@@ -213,7 +205,7 @@ def _light_files(defines: dict) -> list[str]:
     """What it takes to light a point: rays, lamps and sampled emitters."""
     surfaces = ["surface_lib"] if "HAS_EMITTERS" in defines or "HAS_ALPHA" in defines else []
     emitters = ["emitter_lib"] if "HAS_EMITTERS" in defines else []
-    return ["random_lib", *surfaces, "offset_lib", "ray_lib", "direct_light_lib", *emitters, "light_rays_lib"]
+    return ["random_lib", *surfaces, *RAY_FILES, "direct_light_lib", *emitters, "light_rays_lib"]
 
 
 def _mirrored(info, defines: dict, first: int) -> int:

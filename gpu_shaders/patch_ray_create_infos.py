@@ -6,6 +6,7 @@ from __future__ import annotations
 from ..core.patches import MOST_CAUGHT, NO_PATCH, NOTHING
 from ..core.reference_scene import COUPLING_SEARCH
 from .create_infos import (
+    RAY_FILES,
     _coupling_files,
     _couplings,
     _emitters,
@@ -46,7 +47,7 @@ def patch_rays_comp(info, defines):
             *(
                 _light_files(defines | {"HAS_ALPHA": True})
                 if lights_points
-                else ("random_lib", "surface_lib", "offset_lib", "ray_lib")
+                else ("random_lib", "surface_lib", *RAY_FILES)
             ),
             *path_files(defines),
             *_sheet_files(defines),

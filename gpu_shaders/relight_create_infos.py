@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from .create_infos import NO_SURFACE, _image, _ints, _samplers, _scene
+from .create_infos import NO_SURFACE, RAY_FILES, _image, _ints, _samplers, _scene
 from .gloss_create_infos import gloss
 
 
@@ -36,7 +36,7 @@ def surface_again_comp(info, defines):
     _ints(info, "first_slot")
     info.local_group_size(8, 8, 1)
     gloss_lib = ["random_lib", "gloss_lib"] if "HAS_GLOSS" in defines else []
-    files = ["surface_lib", "offset_lib", "ray_lib", *gloss_lib, "surface_again_comp"]
+    files = ["surface_lib", *RAY_FILES, *gloss_lib, "surface_again_comp"]
     return {"compute": ["data_lib", "octahedral_lib", "cubemap_lib", *files]}
 
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from .create_infos import _image, _ints, _lookup, _samplers, _scene, _sheet_files, _sheets
+from .create_infos import RAY_FILES, _image, _ints, _lookup, _samplers, _scene, _sheet_files, _sheets
 
 _VIEW = "view_info[9]"
 _SHADE = "shade_info[2]"
@@ -35,8 +35,7 @@ def _shading_files(defines: dict) -> list[str]:
         *_field_files(defines),
         "random_lib",
         "surface_lib",
-        "offset_lib",
-        "ray_lib",
+        *RAY_FILES,
         "direct_light_lib",
         *_sheet_files(defines),
         "viewport_shade_lib",

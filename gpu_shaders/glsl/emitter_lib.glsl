@@ -100,8 +100,8 @@ float point_share(int group, float density, float distance, float surface_cosine
   return point_density / (point_density + surface_cosine * emitter_cosine * 0.3183098861837907);
 }
 
-/* The ray to a point on an emitter that `brings` so much. From where it starts, which is off the surface: to an emitter a
- * few centimetres away it would be too long otherwise and meet the emitter itself. */
+/* The ray to a point on an emitter that `brings` so much. From where it starts, which is off the surface: to an emitter
+ * a few centimetres away it would be too long otherwise and meet the emitter itself. */
 ShadowRay ray_to_emitter(vec3 point, vec3 origin, int group, vec3 brings)
 {
   vec3 way = point - origin;

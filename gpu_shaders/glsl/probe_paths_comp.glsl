@@ -194,7 +194,7 @@ vec3 origin_of(Way way, Turn turn)
   return step_off(way.surface.position, turn.side * way.surface.normal, -turn.side * way.direction, way.hit.distance);
 }
 
-/* By how much highlights add, against what the surface sends evenly, to light from `direction` by lamps and emitters. */
+/* By how much highlights add to what the surface sends evenly of light by lamps and emitters from `direction`. */
 vec3 highlight_beside(Way way, Turn turn, vec3 direction)
 {
 #ifdef HAS_COUPLING

@@ -7,8 +7,7 @@
  * for both kinds of step otherwise. The triangle test is watertight: Woop, Benthin and Wald, "Watertight Ray/Triangle
  * Intersection", JCGT 2013. Both sides of a triangle are hit. With HAS_ALPHA, triangles of clipped materials ask
  * surface_lib's `is_hole` first; with HAS_UNSEEN, rays pass triangles that their kind does not see; with HAS_LINKS,
- * shadow rays to an emitter those that are none of its blockers. With HAS_TINT holes may be coloured: shadow rays bring
- * along what those leave, of other rays it is asked afterwards.
+ * shadow rays to an emitter those that are none of its blockers.
  *
  * Drivers put a copy of this code wherever a ray is traced, and some compile a program with eight of them for a minute
  * (docs/history.md): shaders trace all shadow rays of a place in one loop, and all others in another.
@@ -340,84 +339,4 @@ bool trace_blockers(vec3 origin, vec3 direction, float limit, int group)
 bool trace_any(vec3 origin, vec3 direction, float limit)
 {
   return trace_blockers(origin, direction, limit, 0);
-}
-
-#ifdef HAS_TINT
-/* What a ray that is of the kind `unseen` brings along of light from `limit` away: nothing where it hits anything
- * nearer, else what coloured holes leave. */
-vec3 passage(vec3 origin, vec3 direction, float limit, int unseen)
-{
-  Ray ray = make_ray(origin, direction);
-  vec3 tint = vec3(1.0);
-  int stack[STACK_SIZE];
-  int top = 0;
-  int item = 0;
-  while (true) {
-    GO_DOWN(tint)
-    int index = -1 - item;
-    bool ends = false, blocks = false;
-    while (!ends && !blocks) {
-      vec4 corner = element(triangle_corners, 3 * index);
-      vec4 corner1 = element(triangle_corners, 3 * index + 1);
-      vec4 corner2 = element(triangle_corners, 3 * index + 2);
-      float distance;
-      vec2 barycentric;
-      if (meets(ray, corner, corner1, corner2, limit, distance, barycentric) &&
-          !is_unseen(ray, corner, corner1, corner2, unseen)) {
-        int flags = int(corner1.w);
-        blocks = (flags & CLIPPED) == 0 || !is_hole(index, barycentric);
-        if (!blocks && (flags & TINTED) != 0) {
-          tint *= hole_tint(index, barycentric);
-        }
-      }
-      ends = corner.w != 0.0;
-      index++;
-    }
-    if (blocks) {
-      return vec3(0.0);
-    }
-    if (top == 0) {
-      return tint;
-    }
-    item = stack[--top];
-  }
-}
-#endif
-
-/* What arrives of light that nothing else hits along a ray as far as `limit`: all, but for coloured holes. */
-vec3 passed_to(vec3 origin, vec3 direction, float limit)
-{
-#ifdef HAS_TINT
-  return passage(origin, direction, limit, UNSEEN_BY_DIFFUSE_RAYS);
-#else
-  return vec3(1.0);
-#endif
-}
-
-/* What arrives along a ray to an emitter of a group of light linking, `limit` away. */
-vec3 light_along(vec3 origin, vec3 direction, float limit, int group)
-{
-#ifdef HAS_TINT
-  return passage(origin, direction, limit, UNSEEN_BY_SHADOW_RAYS | (group << ROLE_SHIFT));
-#else
-  return trace_blockers(origin, direction, limit, group) ? vec3(0.0) : vec3(1.0);
-#endif
-}
-
-/* A ray to a light, and what comes along it if nothing stands between. */
-struct ShadowRay {
-  vec3 origin;
-  vec3 direction;
-  float limit; /* 0 to lights without shadows */
-  int group;   /* of light linking; 0 without HAS_LINKS */
-  vec3 brings;
-};
-
-const ShadowRay NO_SHADOW_RAY = ShadowRay(vec3(0.0), vec3(0.0, 0.0, 1.0), 0.0, 0, vec3(0.0));
-
-/* What comes along it. */
-vec3 brought_by(ShadowRay ray)
-{
-  bool asks = ray.limit > 0.0 && ray.brings != vec3(0.0);
-  return asks ? ray.brings * light_along(ray.origin, ray.direction, ray.limit, ray.group) : ray.brings;
 }

@@ -192,7 +192,7 @@ def test_direct_light(name):
     found = run(
         "lights",
         4000,
-        libraries=["data_lib", "random_lib", "offset_lib", "ray_lib", "direct_light_lib"],
+        libraries=["data_lib", "random_lib", "offset_lib", "ray_lib", "passage_lib", "direct_light_lib"],
         inputs={"points": points, "normals": normals, "places": places},
         textures_2d={**scene.textures, "lights": lamp},
         defines={**scene.defines, "light_count": 1} | ({"HAS_PROFILES": ""} if light.profile else {}),
