@@ -73,8 +73,8 @@ class BusyUser(User):
                 yield from self.bake_at(quality)
             for _ in range(2):
                 yield from self.see_light()
-                yield from self.move_lights()
                 yield from self.add_volume()
+                yield from self.bake_at("DRAFT")
             yield from self.see_light()
         yield from self.new_file()
         for _ in range(2):
@@ -84,6 +84,7 @@ class BusyUser(User):
         for lamps in (0, 3, 1):
             yield from self.have_lamps(lamps)
             yield from self.bake_at("DRAFT")
+        yield from self.see_light_follow()
         for act in self.kinds():
             yield from self.wait_for_bake()
             self.said.append(act.__name__)
@@ -99,6 +100,15 @@ class BusyUser(User):
         """The preview is on until its picture is finished."""
         yield from self.live()
         yield from lit_room.drawn(self.person, 120)
+
+    def see_light_follow(self):
+        """Lamps move until the light of the preview has come after them."""
+        yield from self.see_light()
+        yield from self.move_lights()
+        session = self.person.module("viewport.sessions").existing()[0]
+        yield from self.person.wait_until(
+            lambda: not (session.is_relighting or session.is_pending), "light that follows", 120
+        )
 
     def have_lamps(self, count):
         for item in [item for item in bpy.context.scene.objects if item.type == "LIGHT"]:
