@@ -17,8 +17,8 @@ from .panorama import panorama_directions, panorama_solid_angles
 from .snapshot import Light, World
 
 _PEAK = 16.0  # times the map's mean: what is brighter may be a sun
-_REACH = np.cos(np.radians(4.0))  # from its brightest pixel, what belongs to a sun: discs with their glow
-_AROUND = np.cos(np.radians(8.0))  # what is bright beyond, too, is a bright part of the sky, which rays find
+_REACHES = np.radians([4.0, 8.0])  # from its brightest pixel, what belongs to a sun: discs with their glow, veiled ones
+# What is bright twice as far away, too, is a bright part of the sky, which rays find.
 _MOST_AROUND = 0.2
 _MOST_SUNS = 8
 PROBE_RAYS = 64  # that a probe sends to each sun
@@ -43,19 +43,23 @@ def extract_suns(world: World) -> tuple[World, list[Light]]:
     directions = panorama_directions(width, height).reshape(-1, 3)[bright]
     excess = radiance[bright] * (1 - mean / luminance[bright])[:, None]
     power = excess @ LUMINANCE
-    free = np.ones(len(bright), bool)
+    free, taken = np.ones(len(bright), bool), np.zeros(len(bright), bool)  # may be looked at; belong to a sun
     rest = radiance.copy()
     suns: list[Light] = []
     while free.any() and len(suns) < _MOST_SUNS:
         brightest = int(np.argmax(np.where(free, power, -1.0)))
         cosine = directions @ directions[brightest]
-        member = np.flatnonzero(free & (cosine >= _REACH))
-        around = np.flatnonzero(free & (cosine < _REACH) & (cosine >= _AROUND))
         omega = solid_angles[bright]
-        if power[around] @ omega[around] > _MOST_AROUND * (power[member] @ omega[member]):
+        for reach in _REACHES:
+            member = np.flatnonzero(free & (cosine >= np.cos(reach)))
+            around = np.flatnonzero(~taken & (cosine < np.cos(reach)) & (cosine >= np.cos(2 * reach)))
+            stands_out = power[around] @ omega[around] <= _MOST_AROUND * (power[member] @ omega[member])
+            if stands_out:
+                break
+        if not stands_out:
             free[np.concatenate([member, around])] = False
             continue
-        free[member] = False
+        free[member], taken[member] = False, True
         omega = omega[member]
         rest[bright[member]] -= excess[member]
         suns.append(_lamp(f"sun {len(suns) + 1} of the world", directions[member], excess[member], omega))

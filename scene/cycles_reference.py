@@ -79,7 +79,8 @@ def render_panoramas(
             copy.cycles.seed = (seed + index) % (2**31 - 1)
             panoramas[index] = render_pixels(copy, layer)
             for sun in suns:
-                _refine(copy, layer, panoramas[index], sun)
+                if sun.angle < np.pi / height:  # samples do not miss what fills pixels
+                    _refine(copy, layer, panoramas[index], sun)
             if progress is not None:
                 progress(index + 1, len(positions))
     return panoramas
