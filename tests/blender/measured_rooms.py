@@ -2,10 +2,12 @@
 """Rooms for the tables of docs/measurements.md, each a scene with the grid that is baked in it. All surfaces are
 diffuse unless told; metres."""
 
+import bpy
 import numpy as np
 from gridlight.core.grid import Grid
+from gridlight.core.panorama import panorama_directions
 from gridlight.tests import scenes
-from scene_builders import material, node
+from scene_builders import image, material, node
 
 WHITE, GREY, EARTH = (0.75, 0.75, 0.72), (0.5, 0.5, 0.5), (0.4, 0.35, 0.3)
 
@@ -36,6 +38,23 @@ def window():
     scenes.add_box(scene, "Table", (2, 1.5, 0), (3.2, 2.3, 0.75), scenes.diffuse((0.3, 0.2, 0.1)))
     scenes.add_light(scene, "SUN", rotation=(-0.8, 0.2, 0), energy=3.0, angle=0.01)
     return scene, Grid.from_bounds((0.3, 0.3, 0.3), (4.7, 3.7, 2.5), (5, 5, 4))
+
+
+def veiled_sun():
+    """The same room under an environment map whose sun is a glow of Gauss' shape, three degrees deep, and no lamp."""
+    scene, grid = window()
+    for item in [item for item in scene.objects if item.type == "LIGHT"]:
+        bpy.data.objects.remove(item)
+    width, height = 256, 128
+    away = panorama_directions(width, height) @ (0.21, -0.79, 0.57)
+    glow = np.exp(-((np.arccos(np.clip(away, -1, 1)) / np.radians(3.0)) ** 2) / 2)
+    pixels = np.ones((height, width, 4))
+    pixels[..., :3] = (0.3, 0.4, 0.6) + 180.0 * glow[..., None] * (1.0, 0.9, 0.7)
+    tree = scene.world.node_tree
+    background = next(item for item in tree.nodes if item.type == "BACKGROUND")
+    sky = node(tree, "ShaderNodeTexEnvironment", image=image("Veiled sun", pixels))
+    tree.links.new(sky.outputs["Color"], background.inputs["Color"])
+    return scene, grid
 
 
 def outdoors():
@@ -170,6 +189,7 @@ ROOMS = {
     "Cornell room, area light": in_cornell(),
     "glowing panel 1 cm under the ceiling": panel,
     "window, sun and sky": window,
+    "window, veiled sun of an environment map": veiled_sun,
     "open ground, two boxes, sun and sky": outdoors,
     "cube with its normals outwards, spot": spot_in_a_cube,
     "corridor of 18 m, luminous panels": corridor,
