@@ -16,7 +16,7 @@ class BlockOutcome:
     offset: np.ndarray  # (S, 3) float32 metres from the node to where the probe captures
     shares: np.ndarray  # (S, 4) float32 of the sphere, see GpuBackend.read_shares
     coefficients: np.ndarray  # (S, bands², 3) float32 radiance
-    depth: np.ndarray  # (S, DEPTH_EDGE², 2) float32
+    depth: np.ndarray  # (S, DEPTH_EDGE², DEPTH_VALUES) float32
     gradient: np.ndarray  # (S, 3, K, 3) float32, not limited
     hollow: np.ndarray  # (H,) int64 of nodes: probes in hollows that were still filling with light
     moved: int = 0  # probes that were moved out of walls

@@ -19,7 +19,7 @@ half-integers::
 
 import numpy as np
 
-FORMAT_VERSION = (1, 1)  # of the probe file: readers refuse a newer major
+FORMAT_VERSION = (1, 2)  # of the probe file: readers refuse a newer major
 
 # Cubes stand askew: edges of rooms are parallel to the axes, and would enter or leave a whole row of texels at once. In
 # the gallery this takes a quarter off the error. Rational, by Euler and Rodrigues from (9, 2, 3, 2), so exactly a

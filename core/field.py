@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .conventions import ACTIVE, CULLED, DEPTH_EDGE, INVALID, bands_of
+from .depth_map import DEPTH_VALUES
 from .gradients import gradient_bands
 from .grid import Grid
 
@@ -22,10 +23,12 @@ def state_counts(state: np.ndarray) -> dict[str, int]:
 class Field:
     """Radiance SH of all probes of one grid, with what a lookup needs. P = ``grid.count``, flat node order.
 
-    ``offset`` is the displacement of the capture position from the node in metres. ``depth`` holds mean and mean
-    square of the distance to the nearest surface in an octahedral map (row-major, DEPTH_EDGE² texels) in metres and
-    metres². ``gradient`` is the change of the coefficients that irradiance needs, K of them, per metre along the
-    world's axes; zero where it is not given, and of probes without light of their own (``holds_light``).
+    ``offset`` is the displacement of the capture position from the node in metres. ``depth`` is an octahedral map
+    (row-major, DEPTH_EDGE² texels): mean and mean square of the distance to the nearest surface in metres and metres²;
+    the normal, on the probe's side, of what is in the texel's middle (``pack_normal``; the background faces the probe;
+    0: not known), and its distance. ``gradient`` is the change of the coefficients that irradiance needs, K of them,
+    per metre along the world's axes; zero where it is not given, and of probes without light of their own
+    (``holds_light``).
     ``metadata`` is the JSON part of the probe file.
     """
 
@@ -34,12 +37,15 @@ class Field:
     state: np.ndarray  # (P,) uint8: CULLED, ACTIVE, INVALID
     validity: np.ndarray  # (P,) float32: share of the sphere that is not back faces, 0..1
     offset: np.ndarray  # (P, 3) float32 metres
-    depth: np.ndarray  # (P, DEPTH_EDGE², 2) float32
+    depth: np.ndarray  # (P, DEPTH_EDGE², DEPTH_VALUES) float32
     metadata: dict = field(default_factory=dict)
     # (P, 3, K, 3) float32, K = min(bands, 3)²; __post_init__ fills it in
     gradient: np.ndarray = None  # type: ignore[assignment]
 
     def __post_init__(self):
+        not_known = DEPTH_VALUES - self.depth.shape[-1]  # as they were stored before more than moments was
+        if not_known:
+            self.depth = np.pad(self.depth, ((0, 0), (0, 0), (0, not_known)))
         if self.gradient is None:
             self.gradient = np.zeros((self.grid.count, 3, gradient_bands(self.bands) ** 2, 3), np.float32)
 
@@ -63,5 +69,5 @@ class Field:
             np.full(count, ACTIVE, np.uint8),
             np.ones(count, np.float32),
             np.zeros((count, 3), np.float32),
-            np.zeros((count, DEPTH_EDGE * DEPTH_EDGE, 2), np.float32),
+            np.zeros((count, DEPTH_EDGE * DEPTH_EDGE, DEPTH_VALUES), np.float32),
         )

@@ -3,27 +3,25 @@
 
 Irradiance at a point is the trilinear blend of the eight probes around it, each led to the point by half of its
 gradient: two first-order expansions so blended reproduce the second order as well. Each is weighted by whether it sees
-the point: Chebyshev's inequality on the depth moments of its octahedral map (Donnelly and Lauritzen, I3D 2006; Majercik
-et al., JCGT 2019), asked of inverse distances. A plane's inverse distance is linear in the direction, and texels are
-blended so that their directions come to the one asked for: of a flat wall the map errs nowhere, at whatever slant.
-Points are moved off their surface by a share of the distance to the probe, because a map is as coarse as it is far from
-what it shows. There is no weight for the surface's orientation: it would bend the interpolation in open space, and a
-probe behind a wall is already found by its depth. Culled probes hang in free air, have no statistics and count as seen.
-Where none of the eight sees much of the point, as in a room in which hardly a node stands, those one step around the
-cell are asked, too. Points outside the box are clamped to it, but gradients lead on for half a cell. GLSL twin:
-lookup_lib.glsl and field_lib.glsl.
+the point: Chebyshev's inequality on the distances in its octahedral map (Donnelly and Lauritzen, I3D 2006; Majercik et
+al., JCGT 2019), asked of inverse distances and knowing of planes (core/depth_map.py). Points are moved off their
+surface by a share of the distance to the probe, because a map is as coarse as it is far from what it shows. There is no
+weight for the surface's orientation: it would bend the interpolation in open space, and a probe behind a wall is
+already found by its depth. Culled probes hang in free air, have no statistics and count as seen. Where none of the
+eight sees much of the point, as in a room in which hardly a node stands, those one step around the cell are asked, too.
+Points outside the box are clamped to it, but gradients lead on for half a cell. GLSL twin: lookup_lib.glsl and
+field_lib.glsl.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
 from . import spherical_harmonics as sh
-from .conventions import ACTIVE, DEPTH_EDGE, INVALID
-from .cubemap import octahedral_decode
+from .conventions import ACTIVE, INVALID
+from .depth_map import sample_inverse
 from .field import Field
 from .gradients import per_cell
 from .grid import Grid
@@ -39,7 +37,7 @@ ON_BORDER = 1e-4  # of a cell: what is as near to a border lies on it, or roundi
 BEYOND = 0.5  # cells past the box that gradients lead on
 # Of the distance to the probe: how far points are moved along their normal before they are tested, so that their own
 # surface does not hide them. As far may places in free space look through a wall that they face.
-OFF_SURFACE = 0.09
+OFF_SURFACE = 0.04
 # Times as close as the point: what is closer hides it no more. A probe beside a wall has it in the texels next to those
 # that look along it, a hundred times as close as anything there.
 HIDES = 4.0
@@ -47,7 +45,6 @@ HIDES = 4.0
 # blends of them are up to 1.08, as flat as between points of a wall.
 FARTHEST = 1.1
 _SHARPNESS = 10  # power of the chance
-LEAST_DISTANCE = 1e-6  # of the depth clamp: what a surface at no distance counts as
 _POINTS_AT_ONCE = 1 << 13
 _CORNERS = np.array([[corner & 1, corner >> 1 & 1, corner >> 2] for corner in range(8)])
 _NEIGHBOURS = np.array([[node & 3, node >> 2 & 3, node >> 4] for node in range(64)]) - 1
@@ -157,7 +154,7 @@ def _place(grid: Grid, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.n
 
 
 def visibility(field: Field, nodes: np.ndarray, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """(N, 8) chance that each of ``nodes`` (N, 8) sees its point of ``points`` (N, 3) on a surface with ``normals`` (N,
+    """(N, K) chance that each of ``nodes`` (N, K) sees its point of ``points`` (N, 3) on a surface with ``normals`` (N,
     3)."""
     offset = points[:, None] - (field.grid.positions()[nodes] + field.offset[nodes])
     offset = offset + OFF_SURFACE * np.linalg.norm(offset, axis=2, keepdims=True) * normals[:, None]
@@ -166,8 +163,8 @@ def visibility(field: Field, nodes: np.ndarray, points: np.ndarray, normals: np.
     direction = np.where(away[..., None], offset, [0, 0, 1]) / np.where(away, distance, 1)[..., None]
     clamp = depth_clamp(field.grid)
     inverse_there = np.maximum(clamp / np.where(away, distance, 1), FARTHEST)
-    moments = _sample_inverse(field.depth / [clamp, clamp**2], nodes, direction, HIDES * inverse_there)
-    inverse, variance = np.moveaxis(moments, -1, 0)
+    found = sample_inverse(field.depth, clamp, nodes, direction, HIDES * inverse_there)
+    inverse, variance = np.moveaxis(found, -1, 0)
     beyond = inverse - inverse_there
     least = least_deviation(field.grid) / clamp * inverse * inverse_there
     variance = np.maximum(variance, least**2)
@@ -197,88 +194,3 @@ def irradiance(field: Field, points: np.ndarray, normals: np.ndarray) -> np.ndar
 def _blended(field: Field, nodes: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """(N, K, 3) coefficients of ``nodes`` (N, 8), by ``weights`` (N, 8)."""
     return np.einsum("nw,nwkc->nkc", weights, field.coefficients[nodes].astype(float))
-
-
-def inverse_moments(depth: np.ndarray) -> np.ndarray:
-    """(…, 2) mean and variance of the inverse of a distance whose mean and mean square are ``depth`` (…, 2), to second
-    order about the mean; a spread as large as the mean counts in full, no more."""
-    mean = np.maximum(depth[..., 0].astype(float), LEAST_DISTANCE)
-    spread = np.maximum(depth[..., 1] / mean**2 - 1.0, 0.0)
-    return np.stack([(1.0 + np.minimum(spread, 1.0)) / mean, spread / mean**2], axis=-1)
-
-
-def _sample_inverse(depth: np.ndarray, nodes: np.ndarray, directions: np.ndarray, most: np.ndarray) -> np.ndarray:
-    """(…, 2) inverse moments along ``directions`` (…, 3) of octahedral ``depth`` (P, DEPTH_EDGE², 2) of ``nodes`` (…),
-    blended of four texels, of which none counts as closer than ``most`` (…)."""
-    position, scale = _blended_place(directions)
-    corner = np.floor(position).astype(int)
-    result = np.zeros((*nodes.shape, 2))
-    for step, weight in _texel_weights(position - corner, corner).items():
-        texel = _wrap_octahedral(corner + step)
-        number = texel[..., 1] * DEPTH_EDGE + texel[..., 0]
-        inverse, variance = np.moveaxis(inverse_moments(depth[nodes, number]), -1, 0)
-        along = scale * _texel_lengths()[number]
-        share = np.minimum(along, most / inverse)
-        result = result + weight[..., None] * np.stack([inverse * share, variance * share**2], axis=-1)
-    return result
-
-
-def _blended_place(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where in the map (…, 2), in texels, four of them are blended to ``directions`` d (…, 3); and what the blend is to
-    be multiplied by (…).
-
-    Texels stand at o = d / |d|₁ on the octahedron, whose faces are flat in the map. Between texels on two sides of its
-    edges x = 0 and y = 0, each half a texel from it, a blend cuts the edge off: what it means lies ``inside`` times as
-    far from the octahedron's middle, and is to be looked up ``inside`` times as far from that of the map.
-    """
-    absolute = np.abs(directions)
-    length = absolute.sum(axis=-1)
-    flat = absolute[..., :2] / length[..., None]
-    half = 1.0 / DEPTH_EDGE
-    one_edge = (1.0 - half) / np.maximum(1.0 - flat.min(axis=-1), 1e-9)
-    two_edges = (1.0 - 2.0 * half) / np.maximum(1.0 - flat.sum(axis=-1), 1e-9)
-    inside = np.minimum(1.0, np.minimum(one_edge, two_edges))
-    sign = np.where(directions[..., :2] < 0, -1.0, 1.0)
-    upper = directions[..., 2:] >= 0
-    place = sign * np.where(upper, inside[..., None] * flat, 1.0 - inside[..., None] * flat[..., ::-1])
-    return (place * 0.5 + 0.5) * DEPTH_EDGE - 0.5, length / inside
-
-
-def _texel_weights(blend: np.ndarray, corner: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
-    """Weights (…) of the four texels from ``corner`` (…, 2) on, by step from it, at ``blend`` (…, 2) between them:
-    bilinear, or linear in each of two triangles where the octahedron's edge z = 0 cuts the four in half."""
-    middle = 2 * (corner + 1) - DEPTH_EDGE
-    turned = middle < 0
-    x, y = np.moveaxis(np.where(turned, 1.0 - blend, blend), -1, 0)  # outwards from the middle of the map
-    past = x + y - 1.0
-    outermost = past > 0
-    beside = np.where(outermost, 1.0 - y, x), np.where(outermost, 1.0 - x, y)
-    triangles = np.stack([np.maximum(-past, 0.0), *beside, np.maximum(past, 0.0)])
-    on_edge = np.abs(middle).sum(axis=-1) == DEPTH_EDGE
-    weights = {}
-    for step in np.ndindex(2, 2):
-        out = turned ^ np.array(step, bool)
-        linear = np.take_along_axis(triangles, (out[..., 0] + 2 * out[..., 1])[None], axis=0)[0]
-        weights[step] = np.where(on_edge, linear, np.where(step, blend, 1.0 - blend).prod(axis=-1))
-    return weights
-
-
-@cache
-def _texel_lengths() -> np.ndarray:
-    """(DEPTH_EDGE²,) |o| of texels' middles on the octahedron, which is one over the |d|₁ of their directions."""
-    middle = (np.arange(DEPTH_EDGE) + 0.5) * (2.0 / DEPTH_EDGE) - 1.0
-    uv = np.stack(np.meshgrid(middle, middle), axis=-1).reshape(-1, 2)
-    return 1.0 / np.abs(octahedral_decode(uv)).sum(axis=-1)
-
-
-def _wrap_octahedral(texel: np.ndarray) -> np.ndarray:
-    """Texels one step past the edge of the map, brought to where the sphere goes on."""
-    texel = texel.copy()
-    for axis in (0, 1):
-        value = texel[..., axis]
-        past = (value < 0) | (value >= DEPTH_EDGE)
-        texel[..., 1 - axis] = np.where(past, DEPTH_EDGE - 1 - texel[..., 1 - axis], texel[..., 1 - axis])
-        texel[..., axis] = np.where(
-            value < 0, -1 - value, np.where(value >= DEPTH_EDGE, 2 * DEPTH_EDGE - 1 - value, value)
-        )
-    return texel

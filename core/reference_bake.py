@@ -16,15 +16,15 @@ import numpy as np
 
 from . import culling, dilation, gradients, lookup
 from . import spherical_harmonics as sh
-from .conventions import ACTIVE, CULLED, DEPTH_EDGE, DEPTH_SPREAD, INVALID
+from .conventions import ACTIVE, CULLED, INVALID
 from .cubemap import (
     direction_to_texel,
-    octahedral_decode,
     octahedral_encode,
     pack_normal,
     texel_directions,
     texel_solid_angles,
 )
+from .depth_map import map_directions, sample_directions
 from .direct_light import sample_light
 from .field import Field
 from .gloss import TEXEL_RAYS
@@ -157,18 +157,19 @@ class ReferenceBake:
         lit = surfaces.emission.any(axis=2) | reflected.any(axis=2)
         return np.stack([seen @ self.solid_angles for seen in (solid, background, lit, back)], axis=1) / (4 * np.pi)
 
-    def depth_moments(self, surfaces: Surfaces) -> np.ndarray:
-        """(P, DEPTH_EDGE², 2) mean and mean square of clamped distance, 16 directions a texel."""
-        step = (np.arange(4) - 1.5) * (DEPTH_SPREAD / 4)
-        column, row = np.meshgrid(np.arange(DEPTH_EDGE), np.arange(DEPTH_EDGE))
-        place = np.stack(
-            np.broadcast_arrays(column[..., None, None] + 0.5 + step, row[..., None, None] + 0.5 + step[:, None]), -1
-        )
-        uv = place.reshape(DEPTH_EDGE**2, 16, 2) * (2.0 / DEPTH_EDGE) - 1.0
-        face, row, column = direction_to_texel(octahedral_decode(uv), self.settings.face)
-        texel = (face * self.settings.face + row) * self.settings.face + column
-        distance = np.minimum(surfaces.distance[:, texel], lookup.depth_clamp(self.grid))
-        return np.stack([distance.mean(axis=-1), (distance**2).mean(axis=-1)], axis=-1)
+    def depth_statistics(self, surfaces: Surfaces) -> np.ndarray:
+        """(P, DEPTH_EDGE², DEPTH_VALUES), see Field.depth, of 16 directions a texel."""
+        clamped = np.minimum(surfaces.distance, lookup.depth_clamp(self.grid))
+        distance = clamped[:, self._texels_along(sample_directions())]
+        middle = self._texels_along(map_directions())
+        seen = (surfaces.triangle[:, middle] >= 0)[..., None]
+        normals = pack_normal(octahedral_encode(np.where(seen, surfaces.normal[:, middle], -map_directions())))
+        return np.stack([distance.mean(axis=-1), (distance**2).mean(axis=-1), normals, clamped[:, middle]], axis=-1)
+
+    def _texels_along(self, directions: np.ndarray) -> np.ndarray:
+        """(…) indices of the texels that ``directions`` (…, 3) pass."""
+        face, row, column = direction_to_texel(directions, self.settings.face)
+        return (face * self.settings.face + row) * self.settings.face + column
 
     def field_statistics(self, surfaces: Surfaces, reflected: np.ndarray) -> Field:
         """A dark field with states, validity and depth."""
@@ -176,7 +177,7 @@ class ReferenceBake:
         field = Field.empty(self.grid, self.settings.bands)
         field.state[:] = self.state
         field.validity[self.nodes] = 1 - shares[:, 0]
-        field.depth[self.nodes] = self.depth_moments(surfaces)
+        field.depth[self.nodes] = self.depth_statistics(surfaces)
         field.offset[:] = self.offset
         inside = self.nodes[inside_solid(shares)]
         buried = inside[self.state[inside] == CULLED]

@@ -9,6 +9,10 @@
     offset.X .Y .Z              capture position minus node, metres
     depth.mean.00 … .63         mean distance per octahedral texel, metres
     depth.meansq.00 … .63       mean squared distance, metres²
+    depth.normal.00 … .63       normal, on the probe's side, of what is in a texel's middle: 2047 times its octahedral
+                                coordinates, to whole numbers, plus 2048, the second times 4096; the background faces
+                                the probe; 0: not known
+    depth.middle.00 … .63       distance of that, metres (both: format 1.2; a file without counts as 0)
     dX.L00.R … dZ.L22.B         change of the coefficients that irradiance needs, up to the third band, per metre along
                                 the world's axes: first along X, then Y, then Z (format 1.1; a file without counts as 0)
 
@@ -34,9 +38,11 @@ from . import openexr_file
 from .openexr_file import reason
 
 ATTRIBUTE = "gridlight"
-MAX_BYTES = 1 << 30  # of pixels; a reader that checks the header first never allocates more
+MAX_BYTES = 3 << 29  # of pixels; a reader that checks the header first never allocates more
 _MOST_COMPRESSION = 1100  # no stream of deflate, which ZIP is, gives more than 1032 times its size
 DEPTH_TEXELS = DEPTH_EDGE * DEPTH_EDGE
+# Not in files before format 1.2.
+MIDDLE_NAMES = [f"depth.{what}.{texel:02d}" for what in ("normal", "middle") for texel in range(DEPTH_TEXELS)]
 CONVENTIONS = {
     "space": "right-handed, Z up, metres",
     "order": "x fastest, then y, then z; row = j + ny*k",
@@ -55,11 +61,11 @@ def channel_names(bands: int) -> list[str]:
     names += ["state", "validity", "offset.X", "offset.Y", "offset.Z"]
     for statistic in ("mean", "meansq"):
         names += [f"depth.{statistic}.{texel:02d}" for texel in range(DEPTH_TEXELS)]
-    return names + gradient_names(bands)
+    return names + gradient_names(bands) + MIDDLE_NAMES
 
 
 def gradient_names(bands: int) -> list[str]:
-    """The last of all channels, which files of format 1.0 do not have."""
+    """Channels that files of format 1.0 do not have."""
     names = coefficient_names(gradient_bands(bands))
     return [f"d{axis}.{name}.{color}" for axis in "XYZ" for name in names for color in "RGB"]
 
@@ -146,7 +152,8 @@ def _columns(field: Field) -> list[np.ndarray]:
     columns = list(field.coefficients.reshape(field.grid.count, -1).T)
     columns += [field.state, field.validity, *field.offset.T]
     columns += [*field.depth[:, :, 0].T, *field.depth[:, :, 1].T]
-    return columns + list(field.gradient.reshape(field.grid.count, -1).T)
+    columns += list(field.gradient.reshape(field.grid.count, -1).T)
+    return columns + [*field.depth[:, :, 2].T, *field.depth[:, :, 3].T]
 
 
 def _check_header(path: str, header: dict) -> tuple[dict, Grid, int]:
@@ -184,10 +191,13 @@ def _check_header(path: str, header: dict) -> tuple[dict, Grid, int]:
 
 
 def _expected_names(bands: int, present) -> list[str]:
-    """The channels that a file with the channels ``present`` must have: gradients all or none."""
-    gradients = gradient_names(bands)
-    names = channel_names(bands)
-    return names if any(name in present for name in gradients) else names[: -len(gradients)]
+    """The channels that a file with the channels ``present`` must have: gradients all or none, and so what is in
+    the middle of texels."""
+    absent: set[str] = set()
+    for names in (gradient_names(bands), MIDDLE_NAMES):
+        if not any(name in present for name in names):
+            absent.update(names)
+    return [name for name in channel_names(bands) if name not in absent]
 
 
 def _check_memory(path: str, pixel_bytes: int) -> None:
@@ -223,7 +233,9 @@ def _take(path: str, channels: dict, document: dict, grid: Grid, bands: int) -> 
     digest = hashlib.sha256(_json(document).encode())
     field = Field.empty(grid, bands)
     field.metadata = document
-    for name, column in zip(_expected_names(bands, channels), _columns(field)):
+    columns = dict(zip(channel_names(bands), _columns(field)))
+    for name in _expected_names(bands, channels):
+        column = columns[name]
         pixels = channels.pop(name).pixels
         if pixels.dtype != np.float32 or pixels.shape != (ny * nz, nx):
             shown = f"{pixels.dtype} {pixels.shape}"

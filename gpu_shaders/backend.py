@@ -16,6 +16,7 @@ from ..core import lookup
 from ..core.blocks import Block
 from ..core.conventions import DEPTH_EDGE
 from ..core.cubemap import texel_solid_angles
+from ..core.depth_map import DEPTH_VALUES
 from ..core.emitters import sampling_density
 from ..core.grid import Grid
 from ..core.patches import gather_rays
@@ -158,7 +159,7 @@ class GpuBackend:
         self._field = allocate(len(self._nodes) * self.coefficients, "field coefficients")
         self._gradient.allocate(len(self._nodes))
         self.forget_emission()
-        self._moments = allocate(len(self._nodes) * DEPTH_EDGE**2, "depth statistics", "RG32F")
+        self._depth = allocate(len(self._nodes) * DEPTH_EDGE**2, "depth statistics")
         self._shares = allocate(len(self._nodes), "probes")
 
     # Capture
@@ -232,7 +233,7 @@ class GpuBackend:
         self.scene.bind(shader, "triangle_attributes")
         for name in ("geometry", "albedo", "emission"):
             shader.uniform_sampler(name, surfaces.textures[name])
-        shader.image("depth_moments", self._moments)
+        shader.image("depth_statistics", self._depth)
         shader.image("probe_shares", self._shares)
         shader.uniform_int("first_slot", (surfaces.first + start,))
         shader.uniform_int("first_layer", (start,))
@@ -244,9 +245,9 @@ class GpuBackend:
         return read(self._shares, len(self._nodes))
 
     def read_depth(self) -> np.ndarray:
-        """(slots, DEPTH_EDGE², 2) float32 depth moments."""
-        moments = read(self._moments, len(self._nodes) * DEPTH_EDGE**2, channels=2)
-        return moments.reshape(len(self._nodes), DEPTH_EDGE**2, 2)
+        """(slots, DEPTH_EDGE², DEPTH_VALUES) float32 depth statistics, see Field."""
+        statistics = read(self._depth, len(self._nodes) * DEPTH_EDGE**2, DEPTH_VALUES)
+        return statistics.reshape(len(self._nodes), DEPTH_EDGE**2, DEPTH_VALUES)
 
     # Light
     # ------------------------------------------------------------------------------------------------------------------

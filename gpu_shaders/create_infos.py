@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from ..core import lookup
 from ..core.conventions import DEPTH_EDGE, DEPTH_SPREAD
+from ..core.depth_map import NOT_FLAT
 from ..core.emitters import CANDIDATES, EMITTER_BOXES
 from ..core.gradients import LEAST_COSINE
 from ..core.images import HALF_MAX
@@ -26,7 +27,6 @@ _LOOKUP_CONSTANTS = (
     "FARTHEST",
     "HIDES",
     "INVALID_WEIGHT",
-    "LEAST_DISTANCE",
     "LEAST_WEIGHT",
     "OFF_SURFACE",
     "ON_BORDER",
@@ -77,10 +77,11 @@ def _sheet_files(defines: dict) -> list[str]:
 
 def _lookup(info, first: int) -> int:
     info.define("DEPTH_EDGE", str(DEPTH_EDGE))
+    info.define("NOT_FLAT", repr(NOT_FLAT))
     for name in _LOOKUP_CONSTANTS:
         info.define(name, repr(getattr(lookup, name)))
     info.uniform_buf(0, "vec4", "grid_info[5]")
-    return _samplers(info, "grid_nodes", "depth_moments", first=first)
+    return _samplers(info, "grid_nodes", "sights", first=first)
 
 
 def _surface_files(defines: dict) -> list[str]:
@@ -182,7 +183,7 @@ def probe_statistics_comp(info, defines):
     slot = _samplers(info, "texel_weights", "shells", "patch_irradiance", "triangle_attributes")
     slot = _mirrored(info, defines, slot)
     _samplers(info, "geometry", "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)
-    _image(info, 0, "depth_moments", pixel="RG32F")
+    _image(info, 0, "depth_statistics")
     _image(info, 1, "probe_shares")
     _ints(info, "first_slot", "first_layer")
     info.push_constant("FLOAT", "depth_clamp")

@@ -7,7 +7,8 @@ import gpu
 import numpy as np
 
 from ..core import lookup
-from ..core.conventions import ACTIVE, CULLED, DEPTH_EDGE
+from ..core.conventions import ACTIVE, CULLED
+from ..core.depth_map import sights
 from ..core.error_estimate import interpolation_error
 from ..core.field import Field
 from ..core.gradients import per_cell
@@ -35,8 +36,6 @@ class FieldTextures:
         nodes[:, :3] = self.positions
         nodes[field.state == CULLED, 3] = -1.0
         nodes[active, 3] = np.arange(len(active))
-        moments = np.zeros((len(active) * DEPTH_EDGE**2, 4), np.float32)
-        moments[:, :2] = field.depth[active].reshape(-1, 2)
         self._marks = np.zeros((grid.count, 4), np.float32)
         self._marks[:, 0], self._marks[:, 1] = field.validity, field.state
         self._error_is_known = False
@@ -44,7 +43,7 @@ class FieldTextures:
             "field_in": upload(rows, "field coefficients"),
             "gradient_in": upload(steps, "field gradients"),
             "grid_nodes": upload(nodes, "grid nodes"),
-            "depth_moments": upload(moments, "depth statistics"),
+            "sights": upload(sights(field.depth[active], lookup.depth_clamp(grid)), "depth statistics"),
             "node_marks": upload(self._marks, "grid nodes"),
         }
         self._grid_info = gpu.types.GPUUniformBuf(gpu.types.Buffer("FLOAT", 20, lookup.grid_info(grid).reshape(-1)))

@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 
 from ..core.conventions import ACTIVE, DEPTH_EDGE
+from ..core.depth_map import DEPTH_VALUES
 from ..core.errors import InputError
 from ..core.field import Field, state_counts
 from ..core.gradients import gradient_bands
@@ -32,10 +33,11 @@ _ARRAYS = {
     "state": ("<u1", ()),
     "validity": ("<f4", ()),
     "offset": ("<f4", (3,)),
-    "depth": ("<f4", (DEPTH_EDGE * DEPTH_EDGE, 2)),
+    "depth": ("<f4", (DEPTH_EDGE * DEPTH_EDGE, DEPTH_VALUES)),
     "gradient": ("<f4", (3, -2, 3)),
 }
 _KINDS = {"matrix": bytes, "bands": int, "metadata": str, "details": str, "state": bytes}  # of what panels show
+_MOMENTS = 2  # of the depth's values, that is all that there was once
 _SAME_PLACE = 1e-5  # of the box's size: what a transform may change by rounding
 
 
@@ -86,6 +88,8 @@ def load_field(volume_object: bpy.types.Object) -> Field | None:
             continue  # stored before there were any
         values = np.frombuffer(text.get(name, b""), kind)
         shape = tuple(counts.get(size, size) for size in shape)
+        if name == "depth" and len(values) == grid.count * DEPTH_EDGE**2 * _MOMENTS:
+            shape = (DEPTH_EDGE**2, _MOMENTS)  # stored before what is in the middle was
         if len(values) != grid.count * int(np.prod(shape, initial=1)):
             raise InputError(f"the light stored for '{volume_object.name}' is damaged ({name}); bake the volume again")
         arrays[name] = values.reshape(grid.count, *shape).copy()

@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The field's lookup: trilinear between the eight probes of a cell, weighted by whether each probe sees the point.
- * Reference and reasons: core/lookup.py. Chebyshev's inequality for visibility: Donnelly and Lauritzen, "Variance
- * Shadow Maps", I3D 2006; in probe grids: Majercik et al., "Dynamic Diffuse Global Illumination with Ray-Traced
- * Irradiance Fields", JCGT 2019.
+ * Reference and reasons: core/lookup.py and core/depth_map.py. Needs octahedral_lib. Chebyshev's inequality for
+ * visibility: Donnelly and Lauritzen, "Variance Shadow Maps", I3D 2006; in probe grids: Majercik et al., "Dynamic
+ * Diffuse Global Illumination with Ray-Traced Irradiance Fields", JCGT 2019.
  *
  * grid_info: rows of world-to-lattice (0..2); resolution, depth clamp (3); least deviation (4)
  * grid_nodes, 1 element a node: capture position, slot of an active probe, −1 culled, −2 invalid
- * depth_moments: DEPTH_EDGE² elements a slot, (mean, mean square) of clamped distance
+ * sights: DEPTH_EDGE² elements a slot, see core/depth_map.py. In inverse distances, those of the depth clamp: packed
+ *   normal n of the plane in the middle and l, so that it is l n · d along d; mean, negative where the plane is not
+ *   known; variance
  */
 
 int node_index(ivec3 node)
@@ -24,23 +26,6 @@ ivec2 wrap_octahedral(ivec2 texel)
     texel = ivec2(DEPTH_EDGE - 1 - texel.x, texel.y < 0 ? -1 - texel.y : 2 * DEPTH_EDGE - 1 - texel.y);
   }
   return texel;
-}
-
-/* Mean and variance of the inverse distance, in those of the depth clamp, times the length that the texel's direction
- * has on the octahedron and `scale`; no closer than `most`. */
-vec2 fetch_inverse(int slot, ivec2 texel, float scale, float most)
-{
-  texel = wrap_octahedral(texel);
-  vec2 depth = element(depth_moments, (slot * DEPTH_EDGE + texel.y) * DEPTH_EDGE + texel.x).xy;
-  float inverse = 1.0 / max(depth.x / grid_info[3].w, LEAST_DISTANCE);
-  float scaled = inverse / grid_info[3].w;
-  float spread = max(depth.y * scaled * scaled - 1.0, 0.0);
-  float mean = inverse * (1.0 + min(spread, 1.0));
-  vec2 place = abs((vec2(texel) + 0.5) * (2.0 / float(DEPTH_EDGE)) - 1.0);
-  float height = 1.0 - place.x - place.y;
-  place = height < 0.0 ? 1.0 - place : place;
-  float share = min(scale * length(vec3(place, height)), most / mean);
-  return vec2(mean * share, inverse * inverse * spread * share * share);
 }
 
 /* Weights of the texels from a corner on (x fastest) at `blend` between them: bilinear, or linear in each of two
@@ -61,7 +46,16 @@ vec4 texel_weights(vec2 blend, ivec2 middle)
   return turned.y ? weights.zwxy : weights;
 }
 
-/* Blended of four texels so that their directions come to `direction`: planes are linear in it. See core/lookup.py. */
+/* How far the middle of a texel is from that of the octahedron |x| + |y| + |z| = 1. */
+float octahedron_length(ivec2 texel)
+{
+  vec2 place = abs((vec2(texel) + 0.5) * (2.0 / float(DEPTH_EDGE)) - 1.0);
+  float height = 1.0 - place.x - place.y;
+  return length(vec3(height < 0.0 ? 1.0 - place.yx : place, height));
+}
+
+/* Inverse distance along `direction`, in those of the depth clamp, and its variance. Blended of four texels so that
+ * their directions come to `direction`: planes are linear in it. No nearer than the planes that they see go on. */
 vec2 sample_inverse(int slot, vec3 direction, float most)
 {
   float norm = dot(abs(direction), vec3(1.0)), halved = 1.0 / float(DEPTH_EDGE);
@@ -76,10 +70,18 @@ vec2 sample_inverse(int slot, vec3 direction, float most)
   ivec2 corner = ivec2(floor(position));
   vec4 weights = texel_weights(position - vec2(corner), 2 * (corner + 1) - DEPTH_EDGE);
   float scale = norm / inside;
-  return weights.x * fetch_inverse(slot, corner, scale, most) +
-         weights.y * fetch_inverse(slot, corner + ivec2(1, 0), scale, most) +
-         weights.z * fetch_inverse(slot, corner + ivec2(0, 1), scale, most) +
-         weights.w * fetch_inverse(slot, corner + ivec2(1, 1), scale, most);
+  float blended = 0.0, spread = 0.0, nearest = 0.0;
+  for (int i = 0; i < 4; i++) {
+    ivec2 texel = wrap_octahedral(corner + ivec2(i & 1, i >> 1));
+    vec4 sight = element(sights, (slot * DEPTH_EDGE + texel.y) * DEPTH_EDGE + texel.x);
+    float share = min(scale * octahedron_length(texel), most / abs(sight.z));
+    blended += weights[i] * share * abs(sight.z);
+    spread += weights[i] * share * share * sight.w;
+    float further = sight.y * dot(unpack_normal(sight.x), direction);
+    nearest = max(nearest, sight.z < 0.0 ? most : min(further, most));
+  }
+  float uneven = clamp(NOT_FLAT * (nearest / blended - 1.0), 0.0, 1.0);
+  return vec2(min(blended, nearest), uneven * spread);
 }
 
 /* How likely the probe in `slot` sees `point` on a surface with `normal`, 0..1. */

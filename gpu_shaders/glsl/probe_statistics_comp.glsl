@@ -3,10 +3,10 @@
  * lit.
  *
  * Dispatch: one group of 64 threads a probe; thread t makes texel t of the octahedral map from 16 directions spread
- * over DEPTH_SPREAD of it.
+ * over DEPTH_SPREAD of it, and what is in its middle: the background faces the probe.
  * Back faces of `shells` do not count (core/orientation.py).
- * Writes depth_moments (mean, mean square of the clamped distance) and probe_shares, shares of the sphere: back faces
- * of solids, background, anything that sends light, all back faces.
+ * Writes depth_statistics (mean and mean square of the clamped distance; packed normal and distance in the middle) and
+ * probe_shares, shares of the sphere: back faces of solids, background, anything that sends light, all back faces.
  */
 
 SHARED_ vec4 partial_shares[64];
@@ -27,7 +27,11 @@ void main()
     range = min(range, depth_clamp);
     moments += vec2(range, range * range);
   }
-  imageStore(depth_moments, element_position(slot * DEPTH_EDGE * DEPTH_EDGE + lane), vec4(moments / 16.0, 0.0, 0.0));
+  vec3 middle = octahedral_decode((texel + 0.5) * (2.0 / float(DEPTH_EDGE)) - 1.0);
+  vec3 surface = texelFetch(geometry, ivec3(direction_texel(middle), layer), 0).xyz;
+  float normal = pack_normal(surface.z < NO_SURFACE ? surface.xy : octahedral_encode(-middle));
+  vec4 statistics = vec4(moments / 16.0, normal, min(abs(surface.z), depth_clamp));
+  imageStore(depth_statistics, element_position(slot * DEPTH_EDGE * DEPTH_EDGE + lane), statistics);
 
   vec4 share = vec4(0.0);
   for (int i = lane; i < 6 * FACE * FACE; i += 64) {

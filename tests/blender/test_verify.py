@@ -28,7 +28,7 @@ def furnace(tmp_path_factory):
 def write_field(path, radiance):
     field = Field.empty(Grid.from_bounds([-0.8] * 3, [0.8] * 3, (2, 2, 2)), 3)
     field.coefficients[:, 0] = radiance * np.sqrt(4 * np.pi)
-    field.depth[:] = 10.0, 100.0
+    field.depth[..., :2] = 10.0, 100.0
     probe_file.write(path, field)
     return path
 
@@ -62,7 +62,7 @@ def test_light_below_zero_is_counted(furnace, run_gridlight, tmp_path):
     blend, _ = furnace
     field = Field.empty(Grid.from_bounds([-0.8] * 3, [0.8] * 3, (2, 2, 2)), 2)
     field.coefficients[:, 0], field.coefficients[:, 2] = 1.0, 2.0
-    field.depth[:] = 10.0, 100.0
+    field.depth[..., :2] = 10.0, 100.0
     probe_file.write(tmp_path / "rings.exr", field)
     done = run_gridlight(
         "verify", blend, tmp_path / "rings.exr", "--points", 3, "--spp", 1, "--height", 16, "-o", tmp_path / "out"

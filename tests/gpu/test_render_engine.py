@@ -34,7 +34,7 @@ def scene():
     bpy.context.view_layer.update()
     field = Field.empty(Grid(box_of(volume), resolution_of(volume), "Room"), 2)
     field.coefficients[:, 0] = RADIANCE * np.sqrt(4 * np.pi)
-    field.depth[:] = 100.0, 10000.0
+    field.depth[..., :2] = 100.0, 10000.0
     store_field(volume, field, "known light")
     scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(scene.camera)
@@ -84,7 +84,7 @@ def test_same_picture_as_the_traced_one(scene, tmp_path):
     snapshot = read_scene(scene)
     field = Field.empty(Grid(np.diag([2.5, 2.5, 2.5, 1.0]), (3, 3, 3)), 2)
     field.coefficients[:, 0] = RADIANCE * np.sqrt(4 * np.pi)
-    field.depth[:] = 100.0, 10000.0
+    field.depth[..., :2] = 100.0, 10000.0
     origin = field.grid.center
     textures = SceneTextures(snapshot, origin, np.zeros(len(snapshot.triangles)))
     traced, _ = PreviewPass(snapshot, textures, field, origin).render(snapshot.camera, 64, 36, 32)

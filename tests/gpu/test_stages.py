@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gridlight.core.conventions import LUMINANCE
+from gridlight.core.cubemap import unpack_normal
 from gridlight.core.grid import Grid
 from gridlight.core.orientation import ShellVote
 from gridlight.core.patches import (
@@ -268,10 +269,12 @@ def test_statistics(lit):
     found, nodes = lit.statistics(), lit.reference.nodes
     reflected = lit.reference.reflected(surfaces, lit.patch(), lit.direct())
     np.testing.assert_allclose(lit.backend.read_shares(), lit.reference.shares(surfaces, reflected), atol=1e-5)
-    expected = lit.reference.depth_moments(surfaces)
+    expected = lit.reference.depth_statistics(surfaces)
     # directions exactly on borders of texels: rounding picks the neighbour, on NVIDIA's driver for two of 64
-    agree = np.abs(found.depth[nodes] - expected) <= 1e-5 * expected.max()
-    assert agree.all(axis=-1).mean() > 0.95
+    lengths = [0, 1, 3]
+    agree = np.abs(found.depth[nodes] - expected)[..., lengths] <= 1e-5 * expected[..., lengths].max()
+    same = np.abs(unpack_normal(found.depth[nodes][..., 2]) - unpack_normal(expected[..., 2])) < 2e-3
+    assert (agree.all(axis=-1) & same.all(axis=-1)).mean() > 0.95
     assert np.isfinite(found.depth).all()
 
 

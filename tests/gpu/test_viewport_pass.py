@@ -7,7 +7,8 @@ import pytest
 from gridlight.core import lookup
 from gridlight.core.camera import Camera, look
 from gridlight.core.conventions import ACTIVE, CULLED, DEPTH_EDGE, INVALID
-from gridlight.core.cubemap import direction_to_texel
+from gridlight.core.cubemap import direction_to_texel, octahedral_encode, pack_normal
+from gridlight.core.depth_map import map_directions
 from gridlight.core.display import standard_view, uneven
 from gridlight.core.emitters import sampling_density
 from gridlight.core.field import Field
@@ -81,6 +82,11 @@ def random_field(seed=0, centre=(0.0, 0.0, 0.0), bands=3):
     field.offset[:] = generator.uniform(-0.1, 0.1, (count, 3))
     mean = generator.uniform(0.2, 3.0, (count, DEPTH_EDGE**2))
     field.depth[..., 0], field.depth[..., 1] = mean, mean**2 * generator.uniform(1.0, 1.2, mean.shape)
+    normals = generator.normal(size=(*mean.shape, 3)) - 2.0 * map_directions()  # most of them towards the probe
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    packed = pack_normal(octahedral_encode(normals))
+    field.depth[..., 2] = np.where(generator.random(count) < 0.2, 0.0, packed.T).T  # of some probes not known
+    field.depth[..., 3] = mean * generator.uniform(0.9, 1.1, mean.shape)
     return field
 
 
@@ -165,7 +171,7 @@ def test_normals_look_as_their_numbers():
 def uniform_field(grid, radiance, bands=2):
     field = Field.empty(grid, bands)
     field.coefficients[:, 0] = radiance * np.sqrt(4 * np.pi)
-    field.depth[:] = 100.0, 10000.0
+    field.depth[..., :2] = 100.0, 10000.0
     return field
 
 

@@ -35,7 +35,7 @@ def store_uniform(person, volume, radiance):
     )
     field = person.module("core.field").Field.empty(grid, 3)
     field.coefficients[:, 0] = radiance * np.sqrt(4 * np.pi)
-    field.depth[:] = 100.0, 10000.0
+    field.depth[..., :2] = 100.0, 10000.0
     person.module("scene.field_storage").store_field(volume, field, "known light")
     person.module("viewport").field_changed(volume)
 

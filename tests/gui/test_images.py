@@ -29,7 +29,7 @@ def build(person):
     warm = np.stack([0.5 + 0.4 * x, 0.4 + 0.1 * x * y, 0.35 - 0.25 * x], axis=1)
     field.coefficients[:, 0] = warm * np.sqrt(4 * np.pi)
     field.coefficients[:, 2] = 0.4 * warm * (1 + 0.5 * z)[:, None]
-    field.depth[:] = 100.0, 10000.0
+    field.depth[..., :2] = 100.0, 10000.0
     field.validity[:] = 0.6 + 0.4 * z
     conventions = person.module("core.conventions")
     field.state[4], field.state[22] = conventions.CULLED, conventions.INVALID

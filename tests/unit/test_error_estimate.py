@@ -13,7 +13,7 @@ from gridlight.core.grid import Grid
 def field_of(light, resolution=(9, 5, 4), high=(4.0, 2.0, 1.5), bands=2):
     """A field in the open whose band 0 is ``light`` of the positions (P, 3)."""
     field = Field.empty(Grid.from_bounds((0, 0, 0), high, resolution), bands)
-    field.depth[:] = lookup.depth_clamp(field.grid) ** np.array([1, 2])
+    field.depth[..., :2] = lookup.depth_clamp(field.grid) ** np.array([1, 2])
     field.coefficients[:, 0] = light(field.grid.positions())[:, None]
     return field
 

@@ -4,8 +4,9 @@
 import numpy as np
 import pytest
 from gridlight.core import lookup
-from gridlight.core.conventions import CULLED, DEPTH_EDGE, DEPTH_SPREAD, INVALID
-from gridlight.core.cubemap import octahedral_decode
+from gridlight.core.conventions import CULLED, INVALID
+from gridlight.core.cubemap import octahedral_encode, pack_normal
+from gridlight.core.depth_map import map_directions, sample_directions, sample_inverse
 from gridlight.core.field import Field
 from gridlight.core.grid import Grid
 
@@ -28,11 +29,9 @@ def points_and_normals(count=200, reach=1.0, seed=0):
 
 
 def depth_of(distance_along):
-    """(DEPTH_EDGE², 2) moments of a distance given as a function of directions."""
-    centre = (np.arange(DEPTH_EDGE) + 0.5) * 2 / DEPTH_EDGE - 1
-    u, v = np.meshgrid(centre, centre)
-    distance = distance_along(octahedral_decode(np.stack([u.ravel(), v.ravel()], axis=1)))
-    return np.stack([distance, distance**2], axis=1)
+    """(DEPTH_EDGE², DEPTH_VALUES) statistics of a distance given as a function of directions; nothing of planes."""
+    distance = distance_along(map_directions())
+    return np.stack([distance, distance**2, 0 * distance, 0 * distance], axis=1)
 
 
 def test_uniform_light_is_uniform_everywhere():
@@ -58,7 +57,7 @@ def test_rounding_does_not_take_a_node_from_a_probe_that_moved_away():
     field = open_field((4, 4, 4), np.diag([3.0, 3, 3, 1]))
     node = 21
     field.offset[node] = 0.4
-    field.depth[node] = 0.05, 0.0025
+    field.depth[node, :, :2] = 0.05, 0.0025
     field.coefficients[:, 0] = 1.0
     field.coefficients[node, 0] = 9.0
     alone = field.grid.positions()[node]
@@ -154,7 +153,7 @@ def test_a_cell_without_a_probe_that_sees_reads_the_next_ones():
     field.coefficients[0, 0] = 1.0
     found = lookup.lookup_weights(field, np.array([[-1.5, 0, 0]]), np.array([[1.0, 0, 0]]))
     assert not len(found.lacking) and found.of_corners[0, found.corners[0] == 1].sum() > 0.99, "a corner sees it"
-    field.depth[1] = 0.05, 0.0025  # but for something right before it
+    field.depth[1, :, :2] = 0.05, 0.0025  # but for something right before it
     found = lookup.lookup_weights(field, np.array([[-1.5, 0, 0]]), np.array([[1.0, 0, 0]]))
     assert found.of_around[0, found.around[0] == 2].sum() > 0.99
     found = lookup.irradiance(field, np.array([[-1.5, 0, 0]]), np.array([[1.0, 0, 0]]))
@@ -212,8 +211,8 @@ def test_the_depth_map_has_no_seams():
 
 def inverse_along(field, directions):
     """(N,) inverse of the distance that probe 0 knows of along ``directions`` (N, 3)."""
-    nodes, unlimited = np.zeros(len(directions), int), np.full(len(directions), np.inf)
-    return lookup._sample_inverse(field.depth, nodes, directions, unlimited)[:, 0]
+    nodes, unlimited, clamp = np.zeros(len(directions), int), np.full(len(directions), np.inf), 1e6
+    return sample_inverse(field.depth, clamp, nodes, directions, unlimited)[:, 0] / clamp
 
 
 @pytest.mark.parametrize("normal", [[1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1], [3, 4, 0], [1, -1, 1], [-2, 5, -4]])
@@ -228,13 +227,16 @@ def test_the_depth_map_knows_flat_walls_exactly(normal):
     np.testing.assert_allclose(inverse_along(field, directions), directions @ normal / 1.5, rtol=1e-5)
 
 
-def blurred_depth_of(distance_along, clamp):
-    """(DEPTH_EDGE², 2) moments as a bake stores them: each over a part of its texel (probe_statistics_comp.glsl)."""
-    texels = np.stack(np.meshgrid(np.arange(DEPTH_EDGE), np.arange(DEPTH_EDGE)), axis=-1).reshape(-1, 1, 2)
-    steps = (np.stack(np.meshgrid(np.arange(4), np.arange(4)), axis=-1).reshape(1, -1, 2) - 1.5) * (DEPTH_SPREAD / 4)
-    uv = (texels + 0.5 + steps) * (2 / DEPTH_EDGE) - 1
-    distance = np.minimum(distance_along(octahedral_decode(uv.reshape(-1, 2))), clamp).reshape(len(texels), -1)
-    return np.stack([distance.mean(axis=1), (distance**2).mean(axis=1)], axis=1)
+def walls_around(probe, walls, clamp):
+    """(DEPTH_EDGE², DEPTH_VALUES) statistics as a bake stores them of ``walls``, rows of a normal n and h: all x with
+    n · x = h, seen from ``probe``."""
+    inverse = np.maximum((sample_directions() @ walls[:, :3].T) / (walls[:, 3] - walls[:, :3] @ probe), 1.0 / clamp)
+    middle = (map_directions() @ walls[:, :3].T) / (walls[:, 3] - walls[:, :3] @ probe)
+    distance = 1.0 / inverse.max(axis=2)
+    normals = np.where((middle.max(axis=1) > 1e-6)[:, None], -walls[middle.argmax(axis=1), :3], -map_directions())
+    packed = pack_normal(octahedral_encode(normals))
+    in_middle = 1.0 / np.maximum(middle.max(axis=1), 1.0 / clamp)
+    return np.stack([distance.mean(axis=1), (distance**2).mean(axis=1), packed, in_middle], axis=1)
 
 
 @pytest.mark.parametrize("apart", [0.05, 0.3, 0.45])
@@ -245,10 +247,7 @@ def test_a_wall_seen_at_a_slant_hides_what_is_behind_it(apart):
     probe = field.grid.positions()[0]
     clamp = lookup.depth_clamp(field.grid)
 
-    def wall(d):
-        return np.where(d[:, 0] > 1e-3, apart / np.maximum(d[:, 0], 1e-3), clamp)
-
-    field.depth[0] = blurred_depth_of(wall, clamp)
+    field.depth[0] = walls_around(probe, np.array([[1.0, 0, 0, probe[0] + apart]]), clamp)
     random = np.random.default_rng(4)
     along = random.uniform(0, 1, (2000, 2))
     behind = probe + np.column_stack([np.full(2000, apart + 0.1 + 0.02), along])
@@ -258,3 +257,48 @@ def test_a_wall_seen_at_a_slant_hides_what_is_behind_it(apart):
     before = probe + np.column_stack([np.full(2000, 0.5 * apart), along])
     # A probe at 5 cm cannot tell what is half way to the wall and far along it: others take its part.
     assert lookup.visibility(field, nodes, before, anywhere).mean() > (0.15 if apart < 0.1 else 0.9)
+
+
+def convex_rooms():
+    """Walls, as ``walls_around`` has them, of rooms in which everything sees everything."""
+    box = np.concatenate([np.eye(3), -np.eye(3)])
+    upright = np.column_stack([box, [2.0, 1.5, 1.3, 2.0, 1.5, 1.3]])
+    turn, _ = np.linalg.qr(np.random.default_rng(6).normal(size=(3, 3)))
+    attic = np.concatenate([upright, [[0.0, 0.6, 0.8, 1.2], [0.0, -0.6, 0.8, 1.2]]])
+    return {"upright": upright, "askew": np.column_stack([box @ turn.T, upright[:, 3]]), "under a roof": attic}
+
+
+def convex_room(name):
+    """(walls, field of a volume within them that knows of nothing else)."""
+    walls, field = convex_rooms()[name], open_field((3, 3, 3), np.diag([0.9, 0.7, 0.6, 1.0]))
+    for node, place in enumerate(field.grid.positions()):
+        field.depth[node] = walls_around(place, walls, lookup.depth_clamp(field.grid))
+    return walls, field
+
+
+@pytest.mark.parametrize("room", convex_rooms())
+def test_in_a_convex_room_every_probe_sees_every_place(room):
+    """On its walls, in its edges and its corners: nothing is in the way."""
+    walls, field = convex_room(room)
+    points, normals = places_on(walls, 3000)
+    nodes, plain = lookup.trilinear(field.grid, points)
+    seen = lookup.visibility(field, nodes, points, normals)
+    mean = (plain * seen).sum(axis=1)
+    assert mean.mean() > 0.93 and mean[::3].mean() > 0.83, f"{mean.mean()}, in edges {mean[::3].mean()}"
+
+
+def places_on(walls, count):
+    """(points, normals) at random on the inside of a convex room, a third of them within centimetres of edges."""
+    random = np.random.default_rng(8)
+    directions = random.normal(size=(count, 3))
+    directions[::3] = np.sign(directions[::3]) * walls[:3, 3] + 0.05 * directions[::3]  # towards the corners of the box
+    reach = walls[:, 3] / np.maximum(directions @ walls[:, :3].T, 1e-9)
+    return directions * reach.min(axis=1, keepdims=True), -walls[reach.argmin(axis=1), :3]
+
+
+def test_what_stands_behind_a_wall_of_a_convex_room_is_hidden():
+    walls, field = convex_room("askew")
+    points, normals = places_on(walls, 3000)
+    nodes, plain = lookup.trilinear(field.grid, points)
+    behind = lookup.visibility(field, nodes, points - 0.1 * normals, -normals)  # a wall of 10 cm, its other side
+    assert (plain * behind).sum(axis=1).mean() < 1e-3

@@ -27,7 +27,7 @@ def random_field(resolution=(3, 4, 2), bands=3, seed=0) -> Field:
         rng.integers(0, 3, count).astype(np.uint8),
         rng.random(count, np.float32),
         rng.normal(size=(count, 3)).astype(np.float32),
-        rng.random((count, DEPTH_EDGE**2, 2), np.float32),
+        rng.random((count, DEPTH_EDGE**2, 4), np.float32),
         {"device": "test", "settings": {"bands": bands}, "scene_hash": "0", "warnings": ["one"]},
         rng.normal(size=(count, 3, min(bands, 3) ** 2, 3)).astype(np.float32),
     )
@@ -72,7 +72,7 @@ def test_layout_for_other_readers(written):
     channels = file.channels()
     expected = {f"{name}.{color}" for name in coefficient_names(3) for color in "RGB"} | {"state", "validity"}
     expected |= {f"offset.{axis}" for axis in "XYZ"} | {
-        f"depth.{s}.{t:02d}" for s in ("mean", "meansq") for t in range(64)
+        f"depth.{s}.{t:02d}" for s in ("mean", "meansq", "normal", "middle") for t in range(64)
     }
     expected |= {f"d{axis}.{name}.{color}" for axis in "XYZ" for name in coefficient_names(3) for color in "RGB"}
     assert set(channels) == expected
@@ -82,6 +82,8 @@ def test_layout_for_other_readers(written):
         assert channels["state"].pixels[j + ny * k, i] == field.state[flat]
         assert channels["offset.Z"].pixels[j + ny * k, i] == field.offset[flat, 2]
         assert channels["depth.meansq.17"].pixels[j + ny * k, i] == field.depth[flat, 17, 1]
+        assert channels["depth.normal.63"].pixels[j + ny * k, i] == field.depth[flat, 63, 2]
+        assert channels["depth.middle.05"].pixels[j + ny * k, i] == field.depth[flat, 5, 3]
         assert channels["dY.L2m1.B"].pixels[j + ny * k, i] == field.gradient[flat, 1, 5, 2]
     assert channels["validity"].pixels.dtype == np.float32 and channels["validity"].pixels.shape == (ny * nz, nx)
     document = json.loads(file.header()["gridlight"])
@@ -119,6 +121,20 @@ def test_a_file_of_format_1_0_has_no_gradient(written):
     back = probe_file.read(path)
     assert np.array_equal(back.coefficients, field.coefficients)
     assert back.gradient.shape == field.gradient.shape and not back.gradient.any()
+
+
+def test_a_file_before_1_2_knows_moments_only(written):
+    path, field = written
+
+    def without(channels):
+        return {
+            name: pixels for name, pixels in channels.items() if not name.startswith(("depth.normal", "depth.middle"))
+        }
+
+    edited(path, set_key("format_version", value=[1, 1]), without)
+    back = probe_file.read(path)
+    assert np.array_equal(back.gradient, field.gradient) and np.array_equal(back.depth[..., :2], field.depth[..., :2])
+    assert not back.depth[..., 2:].any()
 
 
 def test_gradients_are_there_whole_or_not_at_all(written):
