@@ -25,10 +25,10 @@ class Field:
 
     ``offset`` is the displacement of the capture position from the node in metres. ``depth`` is an octahedral map
     (row-major, DEPTH_EDGE² texels): mean and mean square of the distance to the nearest surface in metres and metres²;
-    the normal, on the probe's side, of what is in the texel's middle (``pack_normal``; the background faces the probe;
-    0: not known), and its distance. ``gradient`` is the change of the coefficients that irradiance needs, K of them,
-    per metre along the world's axes; zero where it is not given, and of probes without light of their own
-    (``holds_light``).
+    the normal, on the probe's side, of what is in the texel's middle (``pack_normal``; the background faces the probe,
+    as far away as depth is looked for; 0: not known), and its distance. ``gradient`` is the change of the coefficients
+    that irradiance needs, K of them, per metre along the world's axes; zero where it is not given, and of probes
+    without light of their own (``holds_light``).
     ``metadata`` is the JSON part of the probe file.
     """
 

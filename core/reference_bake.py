@@ -24,7 +24,7 @@ from .cubemap import (
     texel_directions,
     texel_solid_angles,
 )
-from .depth_map import map_directions, sample_directions
+from .depth_map import LEAST_COSINE, map_directions, sample_directions
 from .direct_light import sample_light
 from .field import Field
 from .gloss import TEXEL_RAYS
@@ -159,12 +159,18 @@ class ReferenceBake:
 
     def depth_statistics(self, surfaces: Surfaces) -> np.ndarray:
         """(P, DEPTH_EDGE², DEPTH_VALUES), see Field.depth, of 16 directions a texel."""
-        clamped = np.minimum(surfaces.distance, lookup.depth_clamp(self.grid))
-        distance = clamped[:, self._texels_along(sample_directions())]
-        middle = self._texels_along(map_directions())
-        seen = (surfaces.triangle[:, middle] >= 0)[..., None]
-        normals = pack_normal(octahedral_encode(np.where(seen, surfaces.normal[:, middle], -map_directions())))
-        return np.stack([distance.mean(axis=-1), (distance**2).mean(axis=-1), normals, clamped[:, middle]], axis=-1)
+        distance = surfaces.distance[:, self._texels_along(sample_directions())]
+        distance = np.minimum(distance, lookup.depth_clamp(self.grid))
+        at = self._texels_along(map_directions())
+        surface = surfaces.triangle[:, at] >= 0
+        normal = np.where(surface[..., None], surfaces.normal[:, at], -map_directions())
+        slant = (normal * self.directions[at]).sum(axis=-1)
+        slant /= np.minimum((normal * map_directions()).sum(axis=-1), -LEAST_COSINE)
+        middle = np.where(
+            surface, surfaces.distance[:, at] * np.where(slant > 0, slant, 1.0), lookup.depth_clamp(self.grid)
+        )
+        packed = pack_normal(octahedral_encode(normal))
+        return np.stack([distance.mean(axis=-1), (distance**2).mean(axis=-1), packed, middle], axis=-1)
 
     def _texels_along(self, directions: np.ndarray) -> np.ndarray:
         """(…) indices of the texels that ``directions`` (…, 3) pass."""

@@ -8,9 +8,8 @@ begins with an underscore is no shader but what these modules share.
 
 from __future__ import annotations
 
-from ..core import lookup
+from ..core import depth_map, lookup
 from ..core.conventions import DEPTH_EDGE, DEPTH_SPREAD
-from ..core.depth_map import NOT_FLAT
 from ..core.emitters import CANDIDATES, EMITTER_BOXES
 from ..core.gradients import LEAST_COSINE
 from ..core.images import HALF_MAX
@@ -77,7 +76,7 @@ def _sheet_files(defines: dict) -> list[str]:
 
 def _lookup(info, first: int) -> int:
     info.define("DEPTH_EDGE", str(DEPTH_EDGE))
-    info.define("NOT_FLAT", repr(NOT_FLAT))
+    info.define("NOT_FLAT", repr(depth_map.NOT_FLAT))
     for name in _LOOKUP_CONSTANTS:
         info.define(name, repr(getattr(lookup, name)))
     info.uniform_buf(0, "vec4", "grid_info[5]")
@@ -180,6 +179,7 @@ def probe_statistics_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
     info.define("DEPTH_EDGE", str(DEPTH_EDGE))
     info.define("DEPTH_SPREAD", repr(DEPTH_SPREAD))
+    info.define("LEAST_COSINE", repr(depth_map.LEAST_COSINE))
     slot = _samplers(info, "texel_weights", "shells", "patch_irradiance", "triangle_attributes")
     slot = _mirrored(info, defines, slot)
     _samplers(info, "geometry", "albedo", "emission", kind="FLOAT_2D_ARRAY", first=slot)

@@ -3,7 +3,8 @@
  * lit.
  *
  * Dispatch: one group of 64 threads a probe; thread t makes texel t of the octahedral map from 16 directions spread
- * over DEPTH_SPREAD of it, and what is in its middle: the background faces the probe.
+ * over DEPTH_SPREAD of it, and what is in its middle, where the plane of what the texel there
+ * sees is: the background faces the probe.
  * Back faces of `shells` do not count (core/orientation.py).
  * Writes depth_statistics (mean and mean square of the clamped distance; packed normal and distance in the middle) and
  * probe_shares, shares of the sphere: back faces of solids, background, anything that sends light, all back faces.
@@ -28,9 +29,14 @@ void main()
     moments += vec2(range, range * range);
   }
   vec3 middle = octahedral_decode((texel + 0.5) * (2.0 / float(DEPTH_EDGE)) - 1.0);
-  vec3 surface = texelFetch(geometry, ivec3(direction_texel(middle), layer), 0).xyz;
-  float normal = pack_normal(surface.z < NO_SURFACE ? surface.xy : octahedral_encode(-middle));
-  vec4 statistics = vec4(moments / 16.0, normal, min(abs(surface.z), depth_clamp));
+  ivec2 at = direction_texel(middle);
+  vec3 seen = texelFetch(geometry, ivec3(at, layer), 0).xyz;
+  vec4 statistics = vec4(moments / 16.0, pack_normal(octahedral_encode(-middle)), depth_clamp);
+  if (seen.z < NO_SURFACE) {
+    vec3 normal = octahedral_decode(seen.xy);
+    float slant = dot(normal, texel_direction(at)) / min(dot(normal, middle), -LEAST_COSINE);
+    statistics.zw = vec2(pack_normal(seen.xy), abs(seen.z) * (slant > 0.0 ? slant : 1.0));
+  }
   imageStore(depth_statistics, element_position(slot * DEPTH_EDGE * DEPTH_EDGE + lane), statistics);
 
   vec4 share = vec4(0.0);

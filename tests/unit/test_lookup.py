@@ -235,7 +235,7 @@ def walls_around(probe, walls, clamp):
     distance = 1.0 / inverse.max(axis=2)
     normals = np.where((middle.max(axis=1) > 1e-6)[:, None], -walls[middle.argmax(axis=1), :3], -map_directions())
     packed = pack_normal(octahedral_encode(normals))
-    in_middle = 1.0 / np.maximum(middle.max(axis=1), 1.0 / clamp)
+    in_middle = np.where(middle.max(axis=1) > 1e-6, 1.0 / np.maximum(middle.max(axis=1), 1e-6), clamp)
     return np.stack([distance.mean(axis=1), (distance**2).mean(axis=1), packed, in_middle], axis=1)
 
 
