@@ -77,11 +77,16 @@ def sample_inverse(
     ``most`` (…)."""
     position, scale = _blended_place(directions)
     corner = np.floor(position).astype(int)
+    all_texels = np.arange(DEPTH_EDGE**2)
+    ahead = sight(depth, clamp, all_texels) if len(depth) * len(all_texels) < 4 * nodes.size else None
     blended, spread, nearest = (np.zeros(nodes.shape) for _ in range(3))
     for step, weight in _texel_weights(position - corner, corner).items():
         texel = _wrap_octahedral(corner + step)
         number = texel[..., 1] * DEPTH_EDGE + texel[..., 0]
-        found = sight(depth[nodes, number], clamp, number)
+        if ahead is None:
+            found = sight(depth[nodes, number], clamp, number)
+        else:
+            found = Sight(*(values[nodes, number] for values in ahead))
         inverse = np.minimum(found.mean * scale * _texel_lengths()[number], most)
         blended += weight * inverse
         spread += weight * found.variance * (inverse / found.mean) ** 2

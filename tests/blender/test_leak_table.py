@@ -10,7 +10,7 @@ import pytest
 
 pytestmark = [pytest.mark.any_version, pytest.mark.nightly]
 
-MOST_AT_RANDOM, MOST_ABOVE = 0.04, 0.36  # of the lit room; of the volumes
+MOST_AT_RANDOM, MOST_ABOVE = 0.01, 0.03  # of the lit room; of the volumes
 
 
 @pytest.mark.gpu

@@ -30,8 +30,8 @@ CHOICES = {
     "6th power": {"_SHARPNESS": 6},
     "32nd power": {"_SHARPNESS": 32},
     "not moved": {"OFF_SURFACE": 0.0},
-    "moved by 0.05 of the distance": {"OFF_SURFACE": 0.05},
-    "moved by 0.15 of the distance": {"OFF_SURFACE": 0.15},
+    "moved by 0.02 of the distance": {"OFF_SURFACE": 0.02},
+    "moved by 0.09 of the distance": {"OFF_SURFACE": 0.09},
 }
 
 

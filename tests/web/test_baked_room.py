@@ -57,11 +57,8 @@ def test_pixels_of_the_baked_room_agree_with_eval(browse, run_gridlight, room):
 
 
 def test_refined_they_agree_at_the_surface_itself(browse, run_gridlight, room):
-    """With eight times smaller cells three.js looks so close to the walls that no shift needs to be allowed for.
-
-    What is left is visibility: in corners ``eval`` takes a probe for hidden that looks along the wall, and asks others,
-    within less than a fine cell. That is one pixel in fifty.
-    """
+    """With eight times smaller cells three.js looks so close to the walls that no shift needs to be allowed for, also in
+    corners: ``eval`` finds there, as everywhere in a convex room, that every probe sees every place."""
     probes, folder = room / "bake/probes.exr", room / "fine"
     done = run_gridlight("export", probes, "--to", "three", "-o", folder, "--refine", 8, "--scene", room / "room.blend")
     assert done.returncode == 0, done.stderr
@@ -70,9 +67,7 @@ def test_refined_they_agree_at_the_surface_itself(browse, run_gridlight, room):
     assert lit.sum() >= 200
     expected = evaluated(run_gridlight, room, places[lit] @ Y_UP, normals[lit] @ Y_UP)
     error = np.abs(found[lit] - expected).max(axis=1) / expected.max(axis=1)
-    within = [(error < limit).mean() for limit in (0.02, 0.05)]
-    worst = np.quantile(error, 0.999), error.max()
-    assert within[0] > 0.95 and within[1] > 0.98 and worst[0] < 0.25 and worst[1] < 0.5, f"{within}, worst {worst}"
+    assert (error < 0.02).mean() > 0.98 and error.max() < 0.05, f"{(error < 0.02).mean()}, worst {error.max()}"
 
 
 def test_the_glb_is_valid(packages, node, room):
