@@ -57,8 +57,8 @@ def test_pixels_of_the_baked_room_agree_with_eval(browse, run_gridlight, room):
 
 
 def test_refined_they_agree_at_the_surface_itself(browse, run_gridlight, room):
-    """With eight times smaller cells three.js looks so close to the walls that no shift needs to be allowed for, also in
-    corners: ``eval`` finds there, as everywhere in a convex room, that every probe sees every place."""
+    """With eight times smaller cells three.js looks so close to the walls that no shift needs to be allowed for, also
+    in corners: ``eval`` finds there, as everywhere in a convex room, that every probe sees every place."""
     probes, folder = room / "bake/probes.exr", room / "fine"
     done = run_gridlight("export", probes, "--to", "three", "-o", folder, "--refine", 8, "--scene", room / "room.blend")
     assert done.returncode == 0, done.stderr
