@@ -66,7 +66,7 @@ def test_what_they_captured_is_kept_and_what_is_buried_is_filled():
         np.zeros((4, 3), np.float32),
         shares,
         coefficients,
-        np.ones((4, DEPTH_EDGE**2, 2), np.float32),
+        np.ones((4, DEPTH_EDGE**2, 4), np.float32),
         np.ones((4, 3, 9, 3), np.float32),
         np.array([3, 2]),
     )
