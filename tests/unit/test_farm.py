@@ -143,7 +143,7 @@ def test_the_cost_model_adds_up():
     small = model.seconds(plan_of(8, 1000, 64), 1)
     assert small == pytest.approx(one + 8 * 2.0)  # surfaces that do not stay are captured twice
     lines = cost.table(model, plan_of(8, 1000))
-    assert len(lines) == 1 + 4 + 2 and "8 shards of 8 blocks" in lines[-1]
+    assert len(lines) == 1 + 4 + 2 and "shards: 8, of 8 blocks" in lines[-1]
 
 
 def test_a_line_goes_through_what_was_measured():
