@@ -17,7 +17,8 @@ from .panorama import panorama_directions, panorama_solid_angles
 from .snapshot import Light, World
 
 _PEAK = 16.0  # times the map's mean: what is brighter may be a sun
-_REACHES = np.radians([4.0, 8.0])  # from its brightest pixel, what belongs to a sun: discs with their glow, veiled ones
+# From its brightest pixel, what belongs to a sun: discs with their glow, veiled ones, soft boxes.
+_REACHES = np.radians([4.0, 8.0, 16.0])
 # What is bright twice as far away, too, is a bright part of the sky, which rays find.
 _MOST_AROUND = 0.2
 _MOST_SUNS = 8
