@@ -101,6 +101,9 @@ _MAKERS = {
     "glows red in front, blue behind": _one_sided(0.2, 1.5, glow((0.1, 0.2, 1.0, 1), 8.0)),
     "red in front, blue behind": _screen("Backfacing", diffuse(RED), diffuse(BLUE)),
     "the same, turned over": _screen("Backfacing", diffuse(RED), diffuse(BLUE), -1),
+    "lets light through downwards, grey from below": _screen(
+        "Backfacing", diffuse(GREY), ("ShaderNodeBsdfTranslucent", {"Color": RED})
+    ),
     "no shadow": _screen("Is Shadow Ray", diffuse(GREY), clear()),
     "coloured shadow": _screen("Is Shadow Ray", diffuse(GREY), clear((0.9, 0.5, 0.1, 1))),
     "seen by shadow rays alone": _screen("Is Shadow Ray", clear(), diffuse(GREY)),

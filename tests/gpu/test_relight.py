@@ -12,7 +12,7 @@ from gridlight.bake.session import BakeSession
 from gridlight.core.gloss import Gloss
 from gridlight.core.grid import Grid
 from gridlight.core.settings import BakeSettings
-from gridlight.core.snapshot import Image, Light, Material, World
+from gridlight.core.snapshot import FROM_BEHIND, Image, Light, Material, World
 from small_scenes import Silent, bake, box, frame, snapshot_of
 
 SETTINGS = {"face": 8, "tolerance": 1e-6, "capture": "trace"}
@@ -162,6 +162,10 @@ SHAPES = {
     "an emitter moved": (lambda s: with_moved(s, 3, (0.3, 0.2, -0.1)), "refit"),
     "an object left": (lambda s: without(s, 2), "rebuilt"),
     "a leaf without holes": (lambda s: with_material(s, 4, alpha_threshold=0.0), "refit"),
+    "a leaf that glows on one side": (
+        lambda s: with_material(s, 4, emission=(5.0, 3.0, 1.0), unseen_by=FROM_BEHIND),
+        "refit",
+    ),
     "much at once": (
         lambda s: with_material(
             with_light(replace(with_moved(s, 2, (0.1, 0.4, 0)), world=World((0.1, 0.1, 0.1))), 0, color=(1.0, 0, 0)),
