@@ -177,7 +177,7 @@ SHAPES = {
 }
 
 
-SELDOM = {"a light more", "no emission", "emission of a wall", "a leaf without holes"}
+SELDOM = {"a light more", "no emission", "emission of a wall", "a leaf without holes", "a leaf that glows on one side"}
 
 
 ONCE = {
