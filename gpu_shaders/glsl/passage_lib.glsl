@@ -2,9 +2,10 @@
 /* What comes along rays: all light where nothing is hit, but for what coloured holes (HAS_TINT) take of it. */
 
 #ifdef HAS_TINT
-/* What a ray that is of the kind `unseen` brings along of light from `limit` away: nothing where it hits anything
- * nearer, else what coloured holes leave. */
-vec3 passage(vec3 origin, vec3 direction, float limit, int unseen)
+/* What a ray that is of the kind `unseen` brings along of light from `limit` away: what coloured holes leave, and where
+ * it may be `stopped`, nothing where it hits anything nearer. A ray that is known to hit nothing nearer must not be asked
+ * again: drivers round each copy of this code in their own way, and it would be stopped by what it has hit. */
+vec3 passage(vec3 origin, vec3 direction, float limit, int unseen, bool stopped)
 {
   Ray ray = make_ray(origin, direction);
   vec3 tint = vec3(1.0);
@@ -21,13 +22,14 @@ vec3 passage(vec3 origin, vec3 direction, float limit, int unseen)
       vec4 corner2 = element(triangle_corners, 3 * index + 2);
       float distance;
       vec2 barycentric;
-      if (meets(ray, corner, corner1, corner2, limit, distance, barycentric) &&
+      int flags = int(corner1.w);
+      if ((stopped || (flags & TINTED) != 0) && meets(ray, corner, corner1, corner2, limit, distance, barycentric) &&
           !is_unseen(ray, corner, corner1, corner2, unseen)) {
-        int flags = int(corner1.w);
-        blocks = (flags & CLIPPED) == 0 || !is_hole(index, barycentric);
-        if (!blocks && (flags & TINTED) != 0) {
+        bool passes = (flags & CLIPPED) != 0 && is_hole(index, barycentric);
+        if (passes && (flags & TINTED) != 0) {
           tint *= hole_tint(index, barycentric);
         }
+        blocks = stopped && !passes;
       }
       ends = corner.w != 0.0;
       index++;
@@ -47,7 +49,7 @@ vec3 passage(vec3 origin, vec3 direction, float limit, int unseen)
 vec3 passed_to(vec3 origin, vec3 direction, float limit)
 {
 #ifdef HAS_TINT
-  return passage(origin, direction, limit, UNSEEN_BY_DIFFUSE_RAYS);
+  return passage(origin, direction, limit, UNSEEN_BY_DIFFUSE_RAYS, false);
 #else
   return vec3(1.0);
 #endif
@@ -57,7 +59,7 @@ vec3 passed_to(vec3 origin, vec3 direction, float limit)
 vec3 light_along(vec3 origin, vec3 direction, float limit, int group)
 {
 #ifdef HAS_TINT
-  return passage(origin, direction, limit, UNSEEN_BY_SHADOW_RAYS | (group << ROLE_SHIFT));
+  return passage(origin, direction, limit, UNSEEN_BY_SHADOW_RAYS | (group << ROLE_SHIFT), true);
 #else
   return trace_blockers(origin, direction, limit, group) ? vec3(0.0) : vec3(1.0);
 #endif
