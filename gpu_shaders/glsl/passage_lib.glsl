@@ -3,8 +3,8 @@
 
 #ifdef HAS_TINT
 /* What a ray that is of the kind `unseen` brings along of light from `limit` away: what coloured holes leave, and where
- * it may be `stopped`, nothing where it hits anything nearer. A ray that is known to hit nothing nearer must not be asked
- * again: drivers round each copy of this code in their own way, and it would be stopped by what it has hit. */
+ * it may be `stopped`, nothing where it hits anything nearer. A ray that is known to hit nothing nearer must not be
+ * asked again: drivers round each copy of this code in their own way, and it would be stopped by what it has hit. */
 vec3 passage(vec3 origin, vec3 direction, float limit, int unseen, bool stopped)
 {
   Ray ray = make_ray(origin, direction);
