@@ -105,6 +105,20 @@ class GlossPass:
             ends = patches.bind_ends(Places(found.hits, 1, found.sheets), found.count * TEXEL_RAYS, 0)
         if "mirrored" not in textures:
             textures["mirrored"] = allocate(layer_count * texels_each * (TEXEL_RAYS + 1), "texels")
+        texels = first * texels_each, count * texels_each
+        self._put_together(textures["mirrored"], entries, ends, found, patches, texels)
+
+    def _put_together(
+        self,
+        mirrored: gpu.types.GPUTexture,
+        entries: gpu.types.GPUTexture,
+        ends: gpu.types.GPUTexture,
+        found: _Found,
+        patches: PatchFinder,
+        texels: tuple[int, int],
+    ) -> None:
+        """What was ``found``, for ``texels`` (first, count) of the surfaces, those that are no ``entries`` among them;
+        patches at the ``ends`` of rays are marked as seen."""
         shader = program("texel_mirrored_comp", REFLECTIONS=TEXEL_RAYS)
         for name, texture in (
             ("entries", entries),
@@ -113,11 +127,11 @@ class GlossPass:
             ("carried", found.carried),
         ):
             shader.uniform_sampler(name, texture)
-        shader.image("mirrored", textures["mirrored"])
+        shader.image("mirrored", mirrored)
         shader.image("seen", patches.seen)
-        shader.uniform_int("first_texel", (first * texels_each,))
-        shader.uniform_int("texel_count", (count * texels_each,))
-        dispatch_linear(shader, count * texels_each)
+        for name, value in zip(("first_texel", "texel_count"), texels):
+            shader.uniform_int(name, (value,))
+        dispatch_linear(shader, texels[1])
 
     def _glossy(self, textures: dict, first_layer: int, texels: int) -> tuple[gpu.types.GPUTexture, _Found]:
         """The glossy ones of so many ``texels`` from layer ``first_layer`` on, in order, and room for what they see:
