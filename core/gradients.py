@@ -132,7 +132,7 @@ def cell_axes(grid: Grid) -> np.ndarray:
 
 def limited(grid: Grid, gradient: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
     """``gradient`` (P, 3, K, 3) of ``coefficients`` (P, …, 3), scaled down where a lookup would change band 0 by more
-    than itself: a lookup goes half of the gradient over a whole cell or all of it over half a cell along each axis, so
+    than itself: a lookup follows a gradient over half a cell along each axis at most, so
     what it reads of a probe cannot turn negative. By colour, all bands alike."""
     change = np.abs(per_cell(grid, gradient[:, :, :1])).sum(axis=1)[:, 0]
     most = MOST_CHANGE * np.abs(np.asarray(coefficients[:, 0], float))

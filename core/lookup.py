@@ -2,15 +2,16 @@
 """The field's lookup, readable and slow: what iterations, preview, ``eval`` and exporters agree on.
 
 Irradiance at a point is the trilinear blend of the eight probes around it, each led to the point by half of its
-gradient: two first-order expansions so blended reproduce the second order as well. Each is weighted by whether it sees
-the point: Chebyshev's inequality on the distances in its octahedral map (Donnelly and Lauritzen, I3D 2006; Majercik et
-al., JCGT 2019), asked of inverse distances and knowing of planes (core/depth_map.py). Points are moved off their
-surface by a share of the distance to the probe, because a map is as coarse as it is far from what it shows. There is no
-weight for the surface's orientation: it would bend the interpolation in open space, and a probe behind a wall is
-already found by its depth. Culled probes hang in free air, have no statistics and count as seen. Where none of the
-eight sees much of the point, as in a room in which hardly a node stands, those one step around the cell are asked, too.
-Points outside the box are clamped to it, but gradients lead on for half a cell. GLSL twin: lookup_lib.glsl and
-field_lib.glsl.
+gradient: two first-order expansions so blended reproduce the second order as well. Where probes are hidden, what is
+left of the blend means another place than the point, and gradients lead the rest of the way. Each probe is weighted by
+whether it sees the point: Chebyshev's inequality on the distances in its octahedral map (Donnelly and Lauritzen, I3D
+2006; Majercik et al., JCGT 2019), asked of inverse distances and knowing of planes (core/depth_map.py). Points are
+moved off their surface by a share of the distance to the probe, because a map is as coarse as it is far from what it
+shows. There is no weight for the surface's orientation: it would bend the interpolation in open space, and a probe
+behind a wall is already found by its depth. Culled probes hang in free air, have no statistics and count as seen. Where
+none of the eight sees much of the point, as in a room in which hardly a node stands, those one step around the cell are
+asked, too. Points outside the box are clamped to it, but gradients lead on for half a cell. GLSL twin: lookup_lib.glsl
+and field_lib.glsl.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ INVALID_WEIGHT = 1e-27  # of probes inside solids, which carry their neighbours'
 SEEN_ENOUGH = 2e-2
 AROUND_WEIGHT = 5e-4
 ON_BORDER = 1e-4  # of a cell: what is as near to a border lies on it, or rounding would choose between unseen and seen
-BEYOND = 0.5  # cells past the box that gradients lead on
+BEYOND = 0.5  # cells along each axis, past the box and in all, that gradients lead on
 # Of the distance to the probe: how far points are moved along their normal before they are tested, so that their own
 # surface does not hide them. As far may places in free space look through a wall that they face.
 OFF_SURFACE = 0.04
@@ -131,13 +132,14 @@ def trilinear(grid: Grid, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def gradient_steps(grid: Grid, points: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """(N, 8, 3) cells along each axis for which gradients of the corners around ``points`` (N, 3) are followed: half of
-    the way from the node to the point clamped to the box, and up to half a cell on from there. All the less the further
-    their ``weights`` (N, 8) are from the trilinear ones, because few probes are left, and far ones."""
+    """(N, 8, 3) cells along each axis for which gradients of the corners around ``points`` (N, 3) are followed, BEYOND
+    at most: half of the way from the node to the point clamped to the box; from where the ``weights`` (N, 8) blend
+    nodes to, if that is not the point because some are hidden, half of the way as well; and all of it past the box. So
+    light that is linear is reproduced whichever probes are left."""
     _cell, blend, beyond = _place(grid, points)
-    steps = 0.5 * (blend[:, None] - _CORNERS) + np.clip(beyond, -BEYOND, BEYOND)[:, None]
-    share = np.minimum(weights, trilinear(grid, points)[1]).sum(axis=1)
-    return steps * share[:, None, None]
+    halfway = 0.5 * (blend[:, None] - _CORNERS)
+    rest = np.einsum("nw,nwa->na", weights, halfway)  # none for trilinear weights
+    return np.clip(halfway + (rest + np.clip(beyond, -BEYOND, BEYOND))[:, None], -BEYOND, BEYOND)
 
 
 def _place(grid: Grid, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -38,13 +38,12 @@ vec3 field_irradiance(vec3 point, vec3 normal)
   vec3 blend = lattice - vec3(cell);
   vec3 border = floor(blend + 0.5);
   blend = mix(blend, border, lessThan(abs(blend - border), vec3(ON_BORDER)));
-  vec3 lead = 0.5 * blend + clamp(beyond, -BEYOND, BEYOND);
   float transfer[COEFFICIENTS];
   sh_cosine_transfer(normal, transfer);
   ivec3 last = ivec3(grid_info[3].xyz) - 1;
-  float plain[8], weights[8];
+  float weights[8];
   float sum = 0.0, around = 0.0, most = 0.0;
-  vec3 value = vec3(0.0), change = vec3(0.0);
+  vec3 value = vec3(0.0), rest = vec3(0.0);
   for (int item = 0; item < 8 + 64; item++) {
     if (item == 8) {
       around = AROUND_WEIGHT * (1.0 - sum / SEEN_ENOUGH);
@@ -58,7 +57,6 @@ vec3 field_irradiance(vec3 point, vec3 normal)
     if (item < 8) {
       vec3 part = mix(1.0 - blend, blend, vec3(step));
       weight = part.x * part.y * part.z;
-      plain[item] = weight;
       most = max(most, weight);
       weights[item] = 0.0;
     }
@@ -79,13 +77,18 @@ vec3 field_irradiance(vec3 point, vec3 normal)
       value += weight * probe_irradiance(index, transfer);
       if (item < 8) {
         weights[item] = weight;
-        change += weight * irradiance_change(index, lead - 0.5 * vec3(step), transfer);
+        rest += weight * 0.5 * (blend - vec3(step));
       }
     }
   }
-  float share = 0.0; /* of the trilinear blend that visibility left */
+  /* Half of the way from where the blend of what is left is to the point, besides half of that from each node. */
+  vec3 lead = rest / sum + 0.5 * blend + clamp(beyond, -BEYOND, BEYOND);
   for (int corner = 0; corner < 8; corner++) {
-    share += min(weights[corner] / sum, plain[corner]);
+    if (weights[corner] > 0.0) {
+      ivec3 step = lookup_step(corner);
+      vec3 way = clamp(lead - 0.5 * vec3(step), -BEYOND, BEYOND);
+      value += weights[corner] * irradiance_change(node_index(cell + step), way, transfer);
+    }
   }
-  return (value + share * change) / sum;
+  return value / sum;
 }

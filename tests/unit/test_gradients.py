@@ -302,15 +302,42 @@ def test_light_is_continuous_across_cells_and_the_box():
     assert np.abs(np.diff(found, axis=0)).max() < 2e-3
 
 
-def test_hidden_probes_take_gradients_along():
-    """Where one probe of eight is all that sees the point its gradient is followed less, not more."""
+def test_gradients_lead_the_rest_of_the_way_where_probes_are_hidden():
+    """Half of the way from each node for the trilinear blend; all of it from one that is left alone."""
     field = open_field(Grid.from_bounds((0, 0, 0), (1, 1, 1), (2, 2, 2)))
-    points = np.full((1, 3), 0.5)
+    points = np.array([[0.5, 0.5, 0.5], [0.4, 0.1, 0.3], [0.9, 0.2, 0.2]])
     nodes, even = lookup.trilinear(field.grid, points)
-    assert nodes.shape == even.shape == (1, 8)
-    alone = np.eye(8)[:1]
-    np.testing.assert_allclose(lookup.gradient_steps(field.grid, points, even)[0, 0], 0.25)
-    np.testing.assert_allclose(lookup.gradient_steps(field.grid, points, alone)[0, 0], 0.25 / 8)
+    assert nodes.shape == even.shape == (3, 8)
+    np.testing.assert_allclose(lookup.gradient_steps(field.grid, points, even)[:, 0], points / 2)
+    alone = np.tile(np.eye(8)[0], (3, 1))
+    np.testing.assert_allclose(lookup.gradient_steps(field.grid, points, alone)[:, 0], np.minimum(points, 0.5))
+
+
+@pytest.mark.parametrize("hidden", [[7], [0, 3], [1, 2, 4, 6], [1, 2, 3, 4, 5, 6, 7]])
+def test_linear_light_is_reproduced_whichever_probes_are_hidden(hidden):
+    """As far as gradients are followed: here within half a cell of what is left."""
+    field = open_field(Grid.from_bounds((0, 0, 0), (2, 2, 2), (2, 2, 2)))
+    slope = np.array([0.5, -0.3, 0.2])
+    field.coefficients[:] = 0
+    field.coefficients[:, 0] = irradiance_of_band_0(10 + field.grid.positions() @ slope)
+    field.gradient[:] = 0
+    field.gradient[:, :, 0] = irradiance_of_band_0(slope)
+    field.depth[hidden, :, :2] = 0.01, 0.0001
+    field.coefficients[hidden] *= 9
+    left = np.setdiff1d(np.arange(8), hidden)
+    near = field.grid.positions()[left[0]]
+    points = near + 0.99 * (np.random.default_rng(1).random((200, 3)) * np.where(near > 1, -1, 1))
+    found = lookup.irradiance(field, points, some_directions(200))[:, 0]
+    within = (np.abs(lookup.gradient_steps(field.grid, points, _weights(field, points, left))) < 0.5).all(axis=(1, 2))
+    assert within.sum() > 50
+    np.testing.assert_allclose(found[within], (10 + points @ slope)[within], rtol=1e-5)
+
+
+def _weights(field, points, left):
+    """(N, 8) trilinear ones of the nodes that are ``left``, alone."""
+    nodes, weights = lookup.trilinear(field.grid, points)
+    weights = np.where(np.isin(nodes, left), weights, 0.0)
+    return weights / weights.sum(axis=1, keepdims=True)
 
 
 def test_fields_without_gradients_are_read_as_before():
