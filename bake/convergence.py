@@ -26,6 +26,7 @@ MANY_MODES = math.inf  # in place of a factor: the last states tell the limit, s
 _PARALLEL = 0.5  # most sine of the angle between two changes for the tail to be added, per (1 − ratio)
 _SINE_ROUNDING = 1e-6  # squared sine below what float32 sums can tell from zero
 _LEAST = 3  # changes of a series that tell of its limit
+_LEAST_WARM = 4  # the first tells of lamps, not of bounces, so that three are seldom enough
 _MOST_AHEAD = 3  # iterations that go on unwatched: each that was not needed costs about what looking costs a GPU
 _MOST_RATIO = 0.9985  # above it the tail is too uncertain to add
 _MINOR, _LITTLE = 0.25, 0.25  # share of the patches and of |light| that hollows may have where nobody waits for them
@@ -34,12 +35,14 @@ _ROUNDING = 5e-7  # relative change that is nothing but float32 rounding
 
 
 class Convergence:
-    """Watches iterations. ``bounces`` None means as many as needed up to AUTO_LIMIT."""
+    """Watches iterations. ``bounces`` None means as many as needed up to AUTO_LIMIT. ``warm``: from light that was
+    settled before something changed."""
 
-    def __init__(self, bounces: int | None, tolerance: float):
+    def __init__(self, bounces: int | None, tolerance: float, warm: bool = False):
         self._bounces = bounces
         self._tolerance = tolerance
         self._lengths: list[float] = []  # |change| of the iterations since the last extrapolation
+        self._least_first = _LEAST_WARM if warm else _LEAST
         self._slowest = 0.0  # ratio of the slowest mode that was extrapolated: changes may still hold some of it
         self._last_ratio = math.inf
         self.iterations = 0
@@ -55,7 +58,8 @@ class Convergence:
         """How many more iterations it takes at least until something follows from them: nobody has to wait for the sums
         of the ones before. From fewer than _LEAST changes of one series nothing does, and where light is likely to need
         more anyway the next of them can tell."""
-        ahead = max(_LEAST - len(self._lengths), self._likely_ahead())
+        least = _LEAST if self.iterations else self._least_first
+        ahead = max(least - len(self._lengths), self._likely_ahead())
         return ahead if self._bounces is None else min(ahead, self._bounces + 1 - self.iterations)
 
     def _likely_ahead(self) -> int:

@@ -237,7 +237,7 @@ class VolumeBake:
     def _bounce(self, warm: bool) -> Steps[bool]:
         """Iterates until the light has settled, from the dark, or if ``warm`` from the light before, unless that is no
         better start. Returns whether it was."""
-        convergence = Convergence(self.settings.bounces, self.settings.tolerance)
+        convergence = Convergence(self.settings.bounces, self.settings.tolerance, warm)
         while not convergence.done:
             for ahead in range(convergence.until_decision):
                 with self._stopwatch("light"):

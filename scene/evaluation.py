@@ -14,7 +14,7 @@ from typing import TypeVar
 
 import bpy
 
-from .temporary import quiet_stdout, scene_copy
+from .temporary import nothing_to_update, quiet_stdout, scene_copy
 
 Result = TypeVar("Result")
 
@@ -47,9 +47,10 @@ def at_render_quality(
         },
     )
     _leave_edit_data_current(scene)
+    view_layer.update()  # what scripts changed reaches the user's own objects, whose places volumes and cameras have
     bpy.utils.register_class(engine)
     try:
-        with scene_copy(scene) as copy, quiet_stdout():
+        with scene_copy(scene) as copy, quiet_stdout(), nothing_to_update():
             copy.render.engine = engine.bl_idname
             copy.render.resolution_x = copy.render.resolution_y = 4
             bpy.ops.render.render(scene=copy.name, layer=view_layer.name)

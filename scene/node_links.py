@@ -26,10 +26,13 @@ class Reported(Unsupported):
 
 def find_socket(sockets, identifier: str):
     """The enabled socket with this identifier or name, or None."""
+    named = sockets.get(identifier)
+    if named is not None and named.identifier == identifier:  # most are, and Blender finds names faster
+        return named
     for socket in sockets:
         if socket.identifier == identifier:
             return socket
-    return sockets.get(identifier)
+    return named
 
 
 def resolve(socket: bpy.types.NodeSocket, scope: Scope | None):

@@ -100,24 +100,16 @@ def without(snapshot, item):
     return replace(snapshot, **arrays)
 
 
-def assert_same_bake(found, expected, torn=0):
-    """Field, states and statistics agree to 1e-5, but for ``torn`` probes, of which one texel may see something else: a
-    ray along an edge meets either of its triangles, whichever the hierarchy comes to first, and one that followed
-    changes is not in the order of one built anew."""
+def assert_same_bake(found, expected):
+    """Field, states and statistics agree to 1e-5."""
     np.testing.assert_array_equal(found.field.state, expected.field.state)
     np.testing.assert_allclose(found.field.offset, expected.field.offset, atol=1e-6)
     scale = np.abs(expected.field.coefficients).max()
     apart = np.abs(found.field.coefficients - expected.field.coefficients).max(axis=(1, 2)) / scale
-    farther = np.abs(found.field.depth - expected.field.depth) > 1e-6 + 1e-5 * np.abs(expected.field.depth)
-    validity = np.abs(found.field.validity - expected.field.validity)
-    differ = (apart > 1e-5) | farther.any(axis=(1, 2)) | (validity > 1e-5)
-    assert differ.sum() <= torn, (
-        f"probes {np.flatnonzero(differ)} differ, by {apart[differ]} of the largest coefficient"
-    )
-    texel = 1 / (6 * SETTINGS["face"] ** 2)  # of the sphere
-    assert (np.maximum(apart, validity)[differ] < 4 * texel).all() and (
-        farther[differ].any(axis=2).sum(axis=1) <= 4
-    ).all()
+    differ = apart > 1e-5
+    assert not differ.any(), f"probes {np.flatnonzero(differ)} differ, by {apart[differ]} of the largest coefficient"
+    np.testing.assert_allclose(found.field.depth, expected.field.depth, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(found.field.validity, expected.field.validity, atol=1e-5)
     assert found.counts == expected.counts
 
 
@@ -339,7 +331,7 @@ def test_probes_come_and_go_with_surfaces():
     """A cell that surface leaves needs no probe any more, and the other way round."""
     wall, island = box((0.4, -1.5, -1.5), (0.5, 1.5, 1.5)), box((2.4, -0.2, -0.2), (2.6, 0.2, 0.2))
     scene = snapshot_of(
-        np.concatenate([wall, island]),
+        np.concatenate([wall, island]) + (0.0031, 0.0017, -0.0023),  # no ray runs along an edge, where either side is met
         objects=[0] * 12 + [1] * 12,
         lights=rooms().lights,
         world=World((0.2, 0.2, 0.2)),
@@ -353,7 +345,7 @@ def test_probes_come_and_go_with_surfaces():
         relit = session.result.relit
         assert (session.result.field.state != before).any()
         assert 0 < relit.probes_captured < relit.probes or offset < -3
-        assert_same_bake(session.result, bake(new, where, session.settings), torn=1)
+        assert_same_bake(session.result, bake(new, where, session.settings))
 
 
 @pytest.mark.nightly
