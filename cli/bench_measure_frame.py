@@ -216,9 +216,10 @@ def _where_it_goes(snapshot: SceneSnapshot, grid, settings: BakeSettings, should
 
     def relight(whole: bool = False) -> float:
         """Up to the field on the GPU, or ``whole``, up to the one that files hold."""
+        moved = with_moved_light(snapshot, next(moves))
         start = time.perf_counter()
         for steps in (
-            session.relight(with_moved_light(snapshot, next(moves)), live=True),
+            session.relight(moved, live=True),
             session.show(),
             *([session.finish()] if whole else []),
         ):

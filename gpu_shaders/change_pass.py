@@ -24,8 +24,8 @@ def probes_reached(backend: GpuBackend, surfaces: Surfaces, old_boxes: np.ndarra
     """
     boxes = np.zeros((len(old_boxes) + len(new_boxes), 2, 4), np.float32)
     boxes[:, :, :3] = np.concatenate([old_boxes, new_boxes])
-    shader = program("probe_reach_comp", FACE=backend.face, GROUP=_GROUP)
     box_texture, reached = upload(boxes, "boxes"), allocate(surfaces.count, "probes", "R32F")
+    shader = program("probe_reach_comp", FACE=backend.face, GROUP=_GROUP)
     shader.uniform_sampler("probe_slots", backend.probe_slots)
     shader.uniform_sampler("change_boxes", box_texture)
     shader.uniform_sampler("geometry", surfaces.textures["geometry"])
@@ -42,6 +42,7 @@ def resolve_again(backend: GpuBackend, surfaces: Surfaces, new_numbers: np.ndarr
     ``new_numbers`` (T,): new number of each old triangle in leaf order, −1 for none; None where numbers stayed. Returns
     whether a texel that reflected nothing now does, or the other way round.
     """
+    rebind = allocate(1, "flags", "R32F")
     defines = backend.scene.surface_defines | backend.scene.gloss_defines | {"RENUMBER": new_numbers is not None}
     shader = program("surface_again_comp", FACE=backend.face, **defines)
     backend.scene.bind_surfaces(shader)
@@ -55,7 +56,6 @@ def resolve_again(backend: GpuBackend, surfaces: Surfaces, new_numbers: np.ndarr
         shader.uniform_sampler("new_numbers", numbers)
     for name in _IMAGES:
         shader.image(name, surfaces.textures[name])
-    rebind = allocate(1, "flags", "R32F")
     shader.image("rebind", rebind)
     if backend.scene.has_images:  # only they depend on where a texel is seen from; compilers drop the rest
         shader.uniform_int("first_slot", (surfaces.first,))

@@ -13,7 +13,7 @@ import gpu
 from ..core.gloss import TEXEL_RAYS
 from ..core.steps import Pace, Steps
 from .dispatch import compaction_groups, compaction_run, dispatch_linear
-from .growing_array import fill_elements
+from .elements import fill_elements
 from .patch_finder import PatchFinder
 from .places import Places
 from .programs import program

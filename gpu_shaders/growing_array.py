@@ -5,39 +5,8 @@ from __future__ import annotations
 
 import gpu
 
-from .dispatch import dispatch_linear
-from .programs import program
-from .textures import allocate_integers, scratch
-
-
-def copy_elements(source: gpu.types.GPUTexture, target: gpu.types.GPUTexture, pixel: str, count: int, first: int = 0):
-    """Copies the first ``count`` elements of ``source`` to ``target`` from element ``first`` on. ``pixel``: of both."""
-    shader = program("copy_elements_comp", PIXEL=pixel, KIND="UINT_2D" if pixel == "R32UI" else "FLOAT_2D")
-    shader.uniform_sampler("source", source)
-    shader.image("target", target)
-    shader.uniform_int("first", (first,))
-    shader.uniform_int("count", (count,))
-    dispatch_linear(shader, count)
-
-
-def fill_elements(
-    target: gpu.types.GPUTexture,
-    first: int,
-    count: int,
-    value: float,
-    factor: tuple[gpu.types.GPUTexture, int] | None = None,
-) -> None:
-    """Sets ``count`` elements of ``target`` (R32F) from ``first`` on to ``value``, times an element of another array if
-    that is given as ``factor``: array and index."""
-    shader = program("fill_elements_comp", TIMES=factor is not None)
-    shader.image("target", target)
-    if factor is not None:
-        shader.uniform_sampler("factors", factor[0])
-        shader.uniform_int("factor", (factor[1],))
-    shader.uniform_int("first", (first,))
-    shader.uniform_int("count", (count,))
-    shader.uniform_float("value", value)
-    dispatch_linear(shader, count)
+from .elements import copy_elements, fill_elements
+from .textures import scratch
 
 
 class GrowingArray:
@@ -64,12 +33,9 @@ class GrowingArray:
         return self.texture
 
     def _allocate(self) -> gpu.types.GPUTexture:
-        if self._fill is None:
-            return scratch(self.capacity, self._what, self._pixel)
-        if self._pixel == "R32UI":
-            return allocate_integers(self.capacity, self._what, self._fill)
         texture = scratch(self.capacity, self._what, self._pixel)
-        texture.clear(format="FLOAT", value=(float(self._fill),) * (4 if self._pixel.startswith("RGBA") else 1))
+        if self._fill is not None:
+            fill_elements(texture, 0, self.capacity, self._fill, self._pixel)
         return texture
 
 

@@ -12,6 +12,7 @@ import gpu
 from ..core.patches import EMITTERS, Part
 from ..core.settings import BakeSettings
 from .dispatch import dispatch_linear
+from .elements import fill_elements
 from .places import Places
 from .programs import program
 from .scene_textures import SceneTextures
@@ -69,7 +70,7 @@ def find_highlights(
 ) -> None:
     """What ``rays`` bring of highlights by ``parts`` of the light of ``patches``, into ``target``, an element a place
     of the rays."""
-    target.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
+    fill_elements(target, 0, rays.count, 0.0, "RGBA32F")
     for part, *falling in parts:
         defines = _defines(scene, part) | {"HAS_MIRRORS": scene.has_gloss}
         shader = program("patch_highlights_comp", POINTS=rays.places.each, **defines)

@@ -174,9 +174,9 @@ def copy_elements_comp(info, defines):
 
 
 def fill_elements_comp(info, defines):
-    _image(info, 0, "target", pixel="R32F")
+    info.image(0, defines["PIXEL"], defines["KIND"], "target", qualifiers={"WRITE"})
     _ints(info, "first", "count")
-    info.push_constant("FLOAT", "value")
+    info.push_constant("INT" if "INTEGERS" in defines else "FLOAT", "value")
     if "TIMES" in defines:
         _samplers(info, "factors")
         _ints(info, "factor")

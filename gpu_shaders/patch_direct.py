@@ -14,7 +14,8 @@ from ..core.patches import ALL, EMITTERS, SAMPLES, Part, lamps_a_ray, light_part
 from ..core.settings import BakeSettings
 from ..core.steps import Pace, Steps
 from .dispatch import compaction_groups, compaction_run, dispatch_linear, is_software
-from .growing_array import GrowingArray, Scratch, fill_elements
+from .elements import fill_elements
+from .growing_array import GrowingArray, Scratch
 from .places import Places
 from .programs import program
 from .scene_textures import SceneTextures
@@ -172,7 +173,7 @@ class PatchDirect:
         """The total of all parts."""
         total = self._total.reserve(self.count)
         if not self._parts:
-            total.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
+            fill_elements(total, 0, self.count, 0.0, "RGBA32F")
         add_patches(total, self.count, [light.values.texture for light in self._parts.values()])
 
     def find_spread(self, part: Part, places: Places, first: int, stop: int, spread) -> None:

@@ -20,7 +20,8 @@ from ..core.errors import InputError
 from ..core.grid import Grid
 from ..core.patches import MOST_ROUNDS, NO_PATCH, NOTHING, POINTS, VARIANTS, CellRule, coarser_by
 from .dispatch import compaction_groups, compaction_run, dispatch_linear
-from .growing_array import GrowingArray, fill_elements
+from .elements import fill_elements
+from .growing_array import GrowingArray
 from .places import Places, find_couplings
 from .programs import program
 from .scene_textures import SceneTextures
@@ -49,7 +50,7 @@ class PatchFinder:
         self._candidates = GrowingArray("patches", "R32UI", fill=_NOBODY)
         self._places = 0
         self._totals = [gpu.types.GPUTexture((1, 1), format="R32F") for _ in range(2)]
-        self._totals[0].clear(format="FLOAT", value=(0.0,))
+        fill_elements(self._totals[0], 0, 1, 0.0)
         self._reserve(0)
         self._reserve_table(0)
 

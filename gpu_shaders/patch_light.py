@@ -19,7 +19,8 @@ from ..core.patches import MOST_ROUNDS, RAYS, Part, effort, gather_rays
 from ..core.settings import BakeSettings
 from ..core.steps import Pace, Steps, run
 from .dispatch import dispatch_linear
-from .growing_array import GrowingArray, copy_elements
+from .elements import copy_elements
+from .growing_array import GrowingArray
 from .highlight_pass import EndedRays, find_highlights
 from .patch_direct import PatchDirect, add_patches, reduce_patches
 from .patch_finder import PatchFinder
@@ -255,7 +256,7 @@ class PatchLight:
         return self._highlighted
 
     def _with_highlights(self, rays: EndedRays, brought: gpu.types.GPUTexture) -> gpu.types.GPUTexture:
-        found, total = allocate(rays.count, "patches"), scratch(rays.count, "patches")
+        found, total = (scratch(rays.count, "patches") for _ in range(2))
         find_highlights(self._scene, self._settings.seed, rays, self.patches.places, self.direct_by_part(), found)
         add_patches(total, rays.count, [brought, found])
         return total

@@ -54,10 +54,10 @@ class ProbePaths:
 
     def _trace(self, first: int, count: int, bounces: int | None, seed: int) -> tuple[np.ndarray, np.ndarray]:
         scene, paths = self._scene, SETS * self.count * count
+        directions, flux = (allocate(_PARTS * paths, "paths") for _ in range(2))
         shader = program(
             "probe_paths_comp", FACE=_FACE, **(scene.path_defines | {"HAS_COUPLING": scene.has_faint_gloss})
         )
-        directions, flux = (allocate(_PARTS * paths, "paths") for _ in range(2))
         scene.bind_surfaces(shader)
         scene.bind_lights(shader)
         scene.bind_sheets(shader)

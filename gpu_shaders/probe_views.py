@@ -13,9 +13,9 @@ from .textures import allocate, numbers, read
 
 def sightings(backend: GpuBackend, surfaces: Surfaces) -> np.ndarray:
     """(count, 384): which objects each probe sees, see core/orientation.py. Needs direct light."""
+    result = allocate(surfaces.count * 96, "sightings")
     shader = program("object_sightings_comp", FACE=backend.face, **backend.gloss.defines)
     backend.gloss.bind(shader, surfaces.textures, backend.light.direct)
-    result = allocate(surfaces.count * 96, "sightings")
     shader.uniform_sampler("patch_irradiance", backend.light.direct)
     backend.scene.bind(shader, "triangle_attributes")
     for name in ("geometry", "albedo", "emission"):
@@ -27,8 +27,8 @@ def sightings(backend: GpuBackend, surfaces: Surfaces) -> np.ndarray:
 
 def exits(backend: GpuBackend, surfaces: Surfaces, layers_: np.ndarray) -> np.ndarray:
     """(L, 6, 4) offset and distance of the nearest surface in each face, for the probes in ``layers_`` (L,)."""
-    shader = program("probe_exits_comp", FACE=backend.face)
     slots, result = numbers(layers_, "probes"), allocate(len(layers_) * 6, "exits")
+    shader = program("probe_exits_comp", FACE=backend.face)
     shader.uniform_sampler("slots", slots)
     shader.uniform_sampler("geometry", surfaces.textures["geometry"])
     shader.image("exits", result)

@@ -7,6 +7,7 @@ import gpu
 import numpy as np
 
 from ..core.errors import InputError
+from .elements import fill_elements
 
 ROW = 4096  # elements per row: element i sits at (i & 4095, i >> 12), as data_lib.glsl reads it
 
@@ -41,16 +42,17 @@ def scratch(elements: int, what: str, pixel: str = "RGBA32F") -> gpu.types.GPUTe
 
 
 def allocate(elements: int, what: str, pixel: str = "RGBA32F") -> gpu.types.GPUTexture:
-    """Linear array of ``elements`` zeros."""
+    """Linear array of ``elements`` zeros. That is a dispatch, so it cannot stand between another shader's bindings and
+    its own: what is bound belongs to no shader."""
     texture = scratch(elements, what, pixel)
-    texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
+    fill_elements(texture, 0, texture.width * texture.height, 0.0, pixel)
     return texture
 
 
 def allocate_integers(elements: int, what: str, value: int) -> gpu.types.GPUTexture:
-    """Linear array of ``elements`` unsigned 32-bit integers, all of ``value``."""
-    texture = gpu.types.GPUTexture((ROW, _rows(elements, what)), format="R32UI")
-    texture.clear(format="UINT", value=(value - (value >> 31 << 32),))  # Python's binding takes signed ones
+    """Linear array of ``elements`` unsigned 32-bit integers, all of ``value``; see ``allocate``."""
+    texture = scratch(elements, what, "R32UI")
+    fill_elements(texture, 0, elements, value, "R32UI")
     return texture
 
 
@@ -77,7 +79,7 @@ def read_number(texture: gpu.types.GPUTexture) -> int:
 def wait_for_gpu() -> None:
     """Returns when the GPU has done what it was told so far: commands are carried out in order."""
     mark = gpu.types.GPUTexture((1, 1), format="R32F")
-    mark.clear(format="FLOAT", value=(0.0,))  # what nothing was written to is read without waiting
+    fill_elements(mark, 0, 1, 0.0)  # what nothing was written to is read without waiting
     mark.read()
 
 

@@ -331,7 +331,8 @@ def test_probes_come_and_go_with_surfaces():
     """A cell that surface leaves needs no probe any more, and the other way round."""
     wall, island = box((0.4, -1.5, -1.5), (0.5, 1.5, 1.5)), box((2.4, -0.2, -0.2), (2.6, 0.2, 0.2))
     scene = snapshot_of(
-        np.concatenate([wall, island]) + (0.0031, 0.0017, -0.0023),  # no ray runs along an edge, where either side is met
+        np.concatenate([wall, island])
+        + (0.0031, 0.0017, -0.0023),  # no ray runs along an edge, where either side is met
         objects=[0] * 12 + [1] * 12,
         lights=rooms().lights,
         world=World((0.2, 0.2, 0.2)),
