@@ -53,15 +53,17 @@ def _pending(info, defines: dict, *names: str) -> int:
     return 2 if leads else 0
 
 
-def _due(info, *names: str) -> int:
+def _due(info, defines: dict, *names: str) -> int:
     """The same for patch_due_lib."""
-    _samplers(info, "spread", "lights", "mean_lights", *names)
+    parts = int(defines["PARTS"])
+    _samplers(info, *(f"spread{part}" for part in range(parts)), "lights", "mean_lights", *names)
     _ints(info, "patch_count")
-    _image(info, 0, "classes", pixel="R32F", access="READ+WRITE")
+    for part in range(parts):
+        _image(info, part, f"classes{part}", pixel="R32F", access="READ+WRITE")
     info.define("SHADOWED", repr(SHADOWED))
     info.define("DARK", repr(DARK))
     info.define("ERRORS", f"vec3{ERRORS}")
-    return 1
+    return parts
 
 
 _PENDING_FILES = ("random_lib", "patch_cell_lib", "patch_pending_lib")
@@ -76,8 +78,8 @@ def _compaction(info, *files: str, places: bool = True) -> dict:
 
 
 def compact_count_comp(info, defines):
-    picks_due = "DUE" in defines
-    _image(info, _due(info) if picks_due else _pending(info, defines), "block_counts", pixel="R32F")
+    picks_due = "PARTS" in defines
+    _image(info, _due(info, defines) if picks_due else _pending(info, defines), "block_counts", pixel="R32F")
     files = ["patch_due_lib"] if picks_due else _PENDING_FILES
     return _compaction(info, *files, "compaction_lib", "compact_count_comp", places=False)
 
@@ -101,7 +103,7 @@ def compact_list_comp(info, defines):
 
 
 def patch_due_comp(info, defines):
-    image = _due(info, "block_counts")
+    image = _due(info, defines, "block_counts")
     _image(info, image, "due", pixel="R32F")
     _image(info, image + 1, "due_counts", pixel="R32F")
     _ints(info, "result")

@@ -26,6 +26,7 @@ _POINTS_SIDE_BY_SIDE = 4  # of a patch on a GPU, where few patches are lit as lo
 _LAMPS_AT_ONCE = 32  # that a thread takes, where each gets a ray
 _SAMPLES_AT_ONCE = 1 << 20
 _MOST_LISTS, _MOST_TERMS = 4, 4  # that a shader takes
+_FEW_PATCHES = 1 << 18  # up to which all parts are listed at once: of more an array could not hold the lists
 _UNLIT = -1  # in place of an index into SAMPLES
 
 _List = tuple[int, int, int]  # of patches: its first entry in an array of them, its entries, samples that each gets
@@ -119,13 +120,18 @@ class PatchDirect:
         if not self._parts:
             self._add_up()
             return
-        lights, classes, parts = self._lights_together(), len(SAMPLES), list(self._parts.items())
+        lights, parts = self._lights_together(), list(self._parts.items())
+        at_once, classes = _MOST_TERMS if self.count <= _FEW_PATCHES else 1, len(SAMPLES)
         counts = self.scratch("counts", len(parts) * classes, "patches", "R32F")
-        lists = [self._list_due(light, lights, counts, row, row * classes) for row, (_part, light) in enumerate(parts)]
+        lists = []  # of each part: an array, and where in it its lists begin
+        for first in range(0, len(parts), at_once):
+            some = [light for _part, light in parts[first : first + at_once]]
+            due = self._list_due(some, lights, counts, first)
+            lists += [(due, row * classes * self.count) for row in range(len(some))]
         lengths = read(counts, len(parts) * classes, channels=1).reshape(-1, classes).astype(int)
-        for (part, light), due, numbers in zip(parts, lists, lengths.tolist()):
+        for (part, light), (due, begin), numbers in zip(parts, lists, lengths.tolist()):
             entries = [
-                (index * self.count, number, samples * self.effort)
+                (begin + index * self.count, number, samples * self.effort)
                 for index, (number, samples) in enumerate(zip(numbers, SAMPLES))
             ]
             yield from self.light(places, due, entries, light.values.texture, part=part)
@@ -143,21 +149,22 @@ class PatchDirect:
             fill_elements(target, first, stop - first, 1.0 / max(stop - first, 1), factor=(sums, row))
         return lights
 
-    def _list_due(self, light: _PartLight, lights, counts, row: int, first: int) -> gpu.types.GPUTexture:
-        """Patches that ``light``, the part in ``row``, should light with each of SAMPLES and has not yet, marked as lit
-        so: lists of ``count`` elements one after the other. Their lengths go into elements of ``counts`` from ``first``
-        on."""
-        blocks = max(compaction_groups(self.count), 1)
-        block_counts = self.scratch("block counts", blocks * len(SAMPLES), "patches", "R32F")
-        due = self.scratch(f"due {row}", self.count * len(SAMPLES), "patches", "R32F")
+    def _list_due(self, parts: list[_PartLight], lights, counts, first: int) -> gpu.types.GPUTexture:
+        """Patches that each of ``parts``, of which the first is number ``first``, should light with each of SAMPLES and
+        has not yet, marked as lit so: lists of ``count`` elements one after the other. Their lengths go into
+        ``counts``, len(SAMPLES) elements a part."""
+        blocks, lists = max(compaction_groups(self.count), 1), len(parts) * len(SAMPLES)
+        block_counts = self.scratch("block counts", blocks * lists, "patches", "R32F")
+        due = self.scratch(f"due {first}", self.count * lists, "patches", "R32F")
         for name in ("compact_count_comp", "patch_due_comp"):
             if name == "compact_count_comp" and blocks == 1:
                 continue
-            shader = program(name, DUE=name == "compact_count_comp", RUN=compaction_run())
-            shader.uniform_sampler("spread", light.spread.texture)
+            shader = program(name, PARTS=len(parts), RUN=compaction_run())
+            for number, light in enumerate(parts):
+                shader.uniform_sampler(f"spread{number}", light.spread.texture)
+                shader.image(f"classes{number}", light.classes.texture)
             shader.uniform_sampler("lights", lights)
             shader.uniform_sampler("mean_lights", self._mean_lights.texture)
-            shader.image("classes", light.classes.texture)
             shader.uniform_int("patch_count", (self.count,))
             if name == "compact_count_comp":
                 shader.image("block_counts", block_counts)
@@ -165,8 +172,8 @@ class PatchDirect:
                 shader.uniform_sampler("block_counts", block_counts)
                 shader.image("due", due)
                 shader.image("due_counts", counts)
-                shader.uniform_int("result", (first,))
-            gpu.compute.dispatch(shader, blocks, len(SAMPLES), 1)
+                shader.uniform_int("result", (first * len(SAMPLES),))
+            gpu.compute.dispatch(shader, blocks, len(SAMPLES), len(parts))
         return due
 
     def _add_up(self) -> None:

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* First step of a compaction, see compaction_lib: the number of selected entries of each block.
  *
- * Dispatch: one group of 256 threads a block; y = lists.
+ * Dispatch: one group of 256 threads a block; y and z = lists.
  */
 
 void main()

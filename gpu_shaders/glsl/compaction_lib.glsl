@@ -3,7 +3,7 @@
  * (`item`, −1 past the end) and which are picked.
  *
  * compact_count_comp counts per block of BLOCK entries, where there is more than one, then a shader places what was
- * picked: 256 threads a block, RUN entries one after the other a thread. Groups of one y make one list.
+ * picked: 256 threads a block, RUN entries one after the other a thread. Groups of one y and z make one list.
  */
 
 const int BLOCK = 256 * RUN;
@@ -13,7 +13,8 @@ SHARED_ int counts[256];
 /* Among the blocks of all lists. */
 int block_number(int block)
 {
-  return int(gl_WorkGroupID.y * gl_NumWorkGroups.x) + block;
+  uint list = gl_WorkGroupID.z * gl_NumWorkGroups.y + gl_WorkGroupID.y;
+  return int(list * gl_NumWorkGroups.x) + block;
 }
 
 /* How many of this thread's entries are selected, and how many of the block's before it; counts[255] is then the
