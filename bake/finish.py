@@ -72,7 +72,7 @@ def complete(
     field.depth[buried], field.validity[buried], field.offset[buried] = 0.0, 1.0, offset[buried]
     field.coefficients = dilation.fill(grid, field.coefficients, field.holds_light)
     field.gradient[~field.holds_light] = 0.0
-    field.gradient = gradients.limited(grid, field.gradient, field.coefficients)
+    field.gradient = gradients.limited(grid, field.gradient, field.coefficients, states == ACTIVE)
     if settings.deringing:
         result.notes.append(dering_field(field))
     result.counts = state_counts(states)

@@ -72,4 +72,5 @@ class Passes:
         filled = dilation.fill(grid, coefficients.astype(np.float32), known)
         gradient = (self._gradient / self._weight[:, None, None, None]).astype(np.float32)[:, :, : filled.shape[1]]
         gradient[~known] = 0.0
-        return replace(self._first, coefficients=filled, gradient=gradients.limited(grid, gradient, filled))
+        gradient = gradients.limited(grid, gradient, filled, self._first.state == ACTIVE)
+        return replace(self._first, coefficients=filled, gradient=gradient)

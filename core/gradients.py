@@ -28,6 +28,9 @@ LEAST_COSINE = 0.05  # at emitters: light that leaves them flatter changes faste
 _MOST_BANDS = 3  # the cosine lobe has no more
 _NEAREST = 0.5  # of the shortest cell edge
 MOST_CHANGE = 2.0  # of band 0, over one cell along each axis together
+# Times what neighbours differ by. Light that changes faster does so by what is finer than a cell, as slats are, and a
+# gradient tells nothing of half a cell away.
+STEEPEST = 1.5
 
 
 def gradient_bands(bands: int) -> int:
@@ -130,11 +133,39 @@ def cell_axes(grid: Grid) -> np.ndarray:
     return np.where(steps > 0, 2.0 * grid.matrix[:3, :3] / np.maximum(steps, 1), 0.0)
 
 
-def limited(grid: Grid, gradient: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
-    """``gradient`` (P, 3, K, 3) of ``coefficients`` (P, …, 3), scaled down where a lookup would change band 0 by more
-    than itself: a lookup follows a gradient over half a cell along each axis at most, so
-    what it reads of a probe cannot turn negative. By colour, all bands alike."""
-    change = np.abs(per_cell(grid, gradient[:, :, :1])).sum(axis=1)[:, 0]
+def limited(grid: Grid, gradient: np.ndarray, coefficients: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """``gradient`` (P, 3, K, 3) of ``coefficients`` (P, …, 3), as steep as they allow: along each axis of the grid by
+    ``steepness`` of ``known`` (P,) bool probes; then scaled down where a lookup would change band 0 by more than
+    itself. A lookup follows a gradient over half a cell along each axis at most, so what it reads of a probe cannot
+    turn negative. By colour, all bands alike."""
+    along = per_cell(grid, gradient)
+    share = steepness(grid, along, coefficients, known)
+    gradient, steep = gradient.copy(), np.flatnonzero((share < 1.0).any(axis=1))
+    cut = (1.0 - share[steep])[..., None, None] * along[steep]
+    gradient[steep] -= np.einsum("pakc,ai->pikc", cut, np.linalg.pinv(cell_axes(grid))).astype(gradient.dtype)
+    change = (share[..., None] * np.abs(along[:, :, 0])).sum(axis=1)
     most = MOST_CHANGE * np.abs(np.asarray(coefficients[:, 0], float))
     scale = np.where(change > most, most / np.where(change > 0, change, 1.0), 1.0)
     return (gradient * scale[:, None, None]).astype(gradient.dtype)
+
+
+def steepness(grid: Grid, along: np.ndarray, coefficients: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """(P, 3) share of the change ``along`` (P, 3, K, 3) each of the grid's axes, over a cell, that STEEPEST times the
+    larger difference to the two neighbours there allows, as norms of irradiance; 1 where the probe or both neighbours
+    are not ``known`` (P,)."""
+    lobe = sh.cosine_lobe(_MOST_BANDS)[: along.shape[2]]
+    slope = np.sqrt(np.einsum("pakc,pakc->pak", along, along) @ lobe**2)
+    nodes = grid.resolution[::-1]  # arrays over them are ordered z, y, x
+    light = (coefficients[:, : len(lobe)] * lobe[:, None]).reshape(*nodes, -1)
+    known = known.reshape(nodes)
+    most = np.full((*nodes, 3), -1.0)
+    for axis in range(3):
+        first, second = (np.moveaxis(most[..., axis], 2 - axis, 0)[part] for part in (slice(None, -1), slice(1, None)))
+        apart = np.diff(np.moveaxis(light, 2 - axis, 0), axis=0)
+        both = np.moveaxis(known, 2 - axis, 0)
+        difference = np.where(both[:-1] & both[1:], np.sqrt(np.einsum("...i,...i", apart, apart)), -1.0)
+        for end in (first, second):
+            np.maximum(end, difference, out=end)
+    most = STEEPEST * most.reshape(-1, 3)
+    too_steep = (most >= 0) & (slope > most)
+    return np.where(too_steep, most / np.where(too_steep, slope, 1.0), 1.0)

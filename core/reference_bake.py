@@ -290,5 +290,5 @@ def bake(snapshot: SceneSnapshot, grid: Grid, settings: BakeSettings, offset: np
     field.gradient = field.gradient.astype(float)
     field.gradient[job.nodes] = job.gradient(surfaces, reflected)
     field.gradient[~field.holds_light] = 0.0
-    field.gradient = gradients.limited(grid, field.gradient, field.coefficients)
+    field.gradient = gradients.limited(grid, field.gradient, field.coefficients, field.state == ACTIVE)
     return field

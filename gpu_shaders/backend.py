@@ -374,6 +374,11 @@ class GpuBackend:
         return len(self._nodes)
 
     @property
+    def slot_nodes(self) -> np.ndarray:
+        """(slots,) grid indices of the probes that capture."""
+        return self._nodes
+
+    @property
     def light_textures(self) -> tuple[gpu.types.GPUTexture, gpu.types.GPUTexture]:
         """Field and gradient of all slots, as ``read_field`` and ``read_gradient`` would read them."""
         return self._field, self._gradient.texture

@@ -4,12 +4,30 @@ diffuse unless told; metres."""
 
 import bpy
 import numpy as np
+from gridlight.cli import verify, verify_points
+from gridlight.cli.verify_measure import Points
 from gridlight.core.grid import Grid
 from gridlight.core.panorama import panorama_directions
 from gridlight.tests import scenes
 from scene_builders import image, material, node
 
+PLACES, SEEDS = 20, (0, 1)  # of each kind, with each seed: single places make figures jump
 WHITE, GREY, EARTH = (0.75, 0.75, 0.72), (0.5, 0.5, 0.5), (0.4, 0.35, 0.3)
+
+
+def places(scene, snapshot, field):
+    """Probes, free places and places on surfaces where ``field`` is measured."""
+    space = verify_points.FreeSpace(snapshot, verify_points.cycles_light(scene))
+    first, second = (verify.choose_points(field, space, PLACES, seed) for seed in SEEDS)
+    return [
+        Points(
+            one.name,
+            np.concatenate([one.positions, other.positions]),
+            np.concatenate([one.normals, other.normals]),
+            None if one.nodes is None else np.concatenate([one.nodes, other.nodes]),
+        )
+        for one, other in zip(first, second)
+    ]
 
 
 def in_cornell(**options):

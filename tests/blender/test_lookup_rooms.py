@@ -5,11 +5,11 @@
 """
 
 import lookup_rooms
+import measured_rooms
 import numpy as np
 import pytest
 from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.job import run_bake
-from gridlight.cli import verify, verify_points
 from gridlight.cli.progress import Reporter
 from gridlight.cli.verify_measure import Reference, measure
 from gridlight.core.settings import BakeSettings
@@ -17,7 +17,7 @@ from gridlight.scene.read import read_scene
 
 pytestmark = [pytest.mark.any_version, pytest.mark.nightly]
 
-POINTS, SAMPLES, HEIGHT = 12, 16, 32
+SAMPLES, HEIGHT = 16, 32
 MOST = {"free": 0.055, "surfaces": 0.05}  # geometric means over the rooms
 OF_TRILINEAR = 0.5  # of what perfect probes give with plain lookup, likewise
 
@@ -43,7 +43,6 @@ def room_rows(name):
     scene.view_layers[0].update()
     grid, snapshot, quiet = make_grid(scene), read_scene(scene), Reporter(quiet=True)
     field = run_bake(BakeJob(snapshot, grid, BakeSettings()), quiet, lambda: False).field
-    space = verify_points.FreeSpace(snapshot, verify_points.cycles_light(scene))
-    kinds = verify.choose_points(field, space, POINTS, 0)
+    kinds = measured_rooms.places(scene, snapshot, field)
     reference = Reference(scene, SAMPLES, HEIGHT, None, quiet, lambda: False)
     return measure(field, kinds, reference, quiet, True)[1:]

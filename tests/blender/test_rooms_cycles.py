@@ -9,7 +9,6 @@ import measured_rooms
 import pytest
 from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.job import run_bake
-from gridlight.cli import verify, verify_points
 from gridlight.cli.progress import Reporter
 from gridlight.cli.verify_measure import Reference, measure
 from gridlight.core.settings import BakeSettings
@@ -17,7 +16,7 @@ from gridlight.scene.read import read_scene
 
 pytestmark = [pytest.mark.any_version, pytest.mark.nightly]
 
-POINTS, SAMPLES, HEIGHT = 12, 16, 32
+SAMPLES, HEIGHT = 16, 32
 MOST_AT_PROBES = 3.5  # percent above the floor; the sun between slats is finer than texels
 
 
@@ -28,9 +27,8 @@ def test_rooms_that_nothing_was_tuned_to(gpu_context, name):
     scene.view_layers[0].update()
     snapshot, quiet = read_scene(scene), Reporter(quiet=True)
     field = run_bake(BakeJob(snapshot, grid, BakeSettings()), quiet, lambda: False).field
-    space = verify_points.FreeSpace(snapshot, verify_points.cycles_light(scene))
     reference = Reference(scene, SAMPLES, HEIGHT, None, quiet, lambda: False)
-    rows = measure(field, verify.choose_points(field, space, POINTS, 0), reference, quiet, True)
+    rows = measure(field, measured_rooms.places(scene, snapshot, field), reference, quiet, True)
     probes, free, surface = ({name: 100 * value for name, value in row_figures(row).items()} for row in rows)
     print(
         f"\n| {name} | {probes['floor']:.1f} | {probes['error']:.1f} ({probes['bias']:+.1f}) | "

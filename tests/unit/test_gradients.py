@@ -223,7 +223,8 @@ def test_limited_light_never_turns_negative():
     field.gradient *= np.array([0.01, 0.1, 1, 100])[np.arange(field.grid.count) % 4, None, None, None]
     points, normals = points_in(field.grid, 3000, 1.5)
     assert lookup.irradiance(field, points, normals).min() < -1
-    limited = gradients.limited(field.grid, field.gradient, field.coefficients)
+    alone = np.zeros(field.grid.count, bool)
+    limited = gradients.limited(field.grid, field.gradient, field.coefficients, alone)
     gentle = (
         np.abs(gradients.per_cell(field.grid, field.gradient[:, :, :1])).sum(axis=(1, 2)) <= field.coefficients[:, 0]
     )
@@ -239,9 +240,42 @@ def test_dark_probes_and_negative_light_are_limited_without_fuss():
     gradient = np.ones((2, 3, 4, 3), np.float32)
     coefficients = np.zeros((2, 4, 3), np.float32)
     coefficients[1, 0] = -0.25
-    found = gradients.limited(grid, gradient, coefficients)
+    found = gradients.limited(grid, gradient, coefficients, np.zeros(2, bool))
     assert np.isfinite(found).all() and not found[0].any()
     np.testing.assert_allclose(found[1], 0.5)
+
+
+def ramp(grid, per_cell):
+    """Coefficients of band 0 that grow by one a cell along x, and a gradient of ``per_cell`` along x and y."""
+    coefficients = np.zeros((grid.count, 9, 3), np.float32)
+    coefficients[:, 0] = 50.0 + np.arange(grid.resolution[0])[np.arange(grid.count) % grid.resolution[0], None]
+    gradient = np.zeros((grid.count, 3, 9, 3), np.float32)
+    per_metre = np.linalg.pinv(gradients.cell_axes(grid))[:2].sum(axis=0) * per_cell
+    gradient[:, :, 0] = per_metre[:, None]
+    return coefficients, gradient
+
+
+@pytest.mark.parametrize("per_cell, kept", [(0.5, 0.5), (1.0, 1.0), (-1.4, -1.4), (4.0, 1.5), (-4.0, -1.5)])
+def test_gradients_are_as_steep_as_neighbours_allow(per_cell, kept):
+    """Along the ramp up to one and a half times its slope, across it not at all, whichever way the grid lies."""
+    grid = turned_grid((4, 3, 5))
+    coefficients, gradient = ramp(grid, per_cell)
+    limited = gradients.limited(grid, gradient, coefficients, np.ones(grid.count, bool))
+    found = gradients.per_cell(grid, limited)[:, :, 0]
+    np.testing.assert_allclose(found[:, 0], kept, rtol=1e-5)
+    np.testing.assert_allclose(found[:, 1:], 0, atol=1e-5)
+
+
+def test_only_neighbours_that_are_known_tell_what_is_steep():
+    grid = Grid.from_bounds((0, 0, 0), (2, 2, 1), (3, 3, 1))
+    coefficients, gradient = ramp(grid, 4.0)
+    known = np.array([1, 1, 1, 0, 1, 0, 0, 0, 0], bool)
+    limited = gradients.per_cell(grid, gradients.limited(grid, gradient, coefficients, known))[:, :, 0, 0]
+    np.testing.assert_allclose(limited[:3, 0], 1.5, rtol=1e-6)
+    np.testing.assert_allclose(limited[[0, 2], 1], 4.0, rtol=1e-6)  # above them nobody is known
+    np.testing.assert_allclose(limited[[1, 4], 1], 0.0, atol=1e-6)
+    np.testing.assert_allclose(limited[4, 0], 4.0, rtol=1e-6)
+    np.testing.assert_allclose(limited[~known], [[4.0, 4.0, 0.0]] * 5, rtol=1e-6)
 
 
 # The lookup
