@@ -57,13 +57,14 @@ def _bilinear(pixels: np.ndarray, uv: np.ndarray, extension: str) -> np.ndarray:
     blend = position - corner
     result = np.zeros((len(uv), 4))
     for step in np.ndindex(2, 2):
-        texel = _wrap(corner + step, size, extension)
+        texel = wrapped(corner + step, size, extension)
         weight = np.where(step, blend, 1 - blend).prod(axis=1)
         result += weight[:, None] * pixels[texel[:, 1], texel[:, 0]]
     return result
 
 
-def _wrap(texel: np.ndarray, size: np.ndarray, extension: str) -> np.ndarray:
+def wrapped(texel: np.ndarray, size: np.ndarray | int, extension: str) -> np.ndarray:
+    """Indices ``texel`` of any size, brought into 0 … ``size`` − 1 as ``extension`` of an image texture node says."""
     if extension == "REPEAT":
         return texel % size
     if extension == "MIRROR":

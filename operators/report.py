@@ -71,6 +71,7 @@ def _report(title: str, volumes: list[bpy.types.Object]) -> ReportData:
                 field.metadata.get("iterations", 0),
                 field.metadata.get("converged", True),
                 detail.get("notes", []),
+                field.metadata.get("error"),
             )
             for field, detail in zip(fields, details)
         ],

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core.images import wrapped
+
 _EDGE = 512  # of the finer grid, about
 _LEAST_GAIN, _MOST_GAIN = 2, 8
 MOST_EDGE = 2048  # of images that are worth the memory
@@ -56,7 +58,7 @@ def _resampled(pixels: np.ndarray, gain: int, interpolation: str, extension: str
         shape[axis] = -1
         total = 0.0
         for step, weight in taps.items():
-            source = np.take(pixels, _wrapped(first + step, count, extension), axis)
+            source = np.take(pixels, wrapped(first + step, count, extension), axis)
             total = total + source * weight.astype(np.float32).reshape(shape)
         pixels = total
     return pixels
@@ -72,12 +74,3 @@ def _taps(t: np.ndarray, cubic: bool) -> dict[int, np.ndarray]:
         1: (-3 * t**3 + 3 * t**2 + 3 * t + 1) / 6,
         2: t**3 / 6,
     }
-
-
-def _wrapped(index: np.ndarray, count: int, extension: str) -> np.ndarray:
-    if extension == "REPEAT":
-        return index % count
-    if extension == "MIRROR":
-        folded = index % (2 * count)
-        return np.where(folded < count, folded, 2 * count - 1 - folded)
-    return np.clip(index, 0, count - 1)

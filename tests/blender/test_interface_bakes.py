@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bakes and relights by their operators, and the light that is stored in the file, without a window."""
 
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
@@ -46,6 +48,9 @@ def test_a_target_error_is_baked_for_and_what_was_reached_is_told(room, gpu_cont
     assert baked.metadata["error"]["target"] == 0.2 and baked.metadata["error"]["met"]
     assert baked.bands == baked.metadata["settings"]["bands"] < 3
     assert "error at probes" in stored_details(room)["outcome"]
+    assert bpy.ops.gridlight.report() == {"FINISHED"}
+    report = (Path(bpy.app.tempdir) / "gridlight-report.html").read_text()
+    assert "Error at probes" in report and "target, met" in report
 
 
 def test_a_copied_volume_keeps_the_originals_light_apart(room, gpu_context):

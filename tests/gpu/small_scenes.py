@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.job import run_bake
+from gridlight.bake.result import Silent
 from gridlight.core import lookup
 from gridlight.core.light_profiles import DISTANCES_M, HEIGHT, WIDTH, LightProfile
 from gridlight.core.panorama import panorama_directions
@@ -13,18 +14,6 @@ from gridlight.core.sampling import tangent_frame
 from gridlight.core.snapshot import DITHERED, Image, Light, Material, SceneSnapshot, World
 
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
-
-
-class Silent:
-    """A reporter that says nothing."""
-
-    def phase(self, name, total=None):
-        pass
-
-    def advance(self, amount=1):
-        pass
-
-    note = warn = advance
 
 
 def bake(snapshot, grid, settings):

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.block_session import open_session
+from gridlight.bake.result import Silent
 from gridlight.core.blocks import cut
 from gridlight.core.conventions import ACTIVE, INVALID
 from gridlight.core.grid import Grid
 from gridlight.core.probe_states import invalid_counts
 from gridlight.core.settings import BakeSettings
 from gridlight.core.snapshot import Light, Material
-from small_scenes import Silent, all_lights, bake, box, cluttered_room, frame, furnace, irradiance_at_nodes, snapshot_of
+from small_scenes import all_lights, bake, box, cluttered_room, frame, furnace, irradiance_at_nodes, snapshot_of
 
 
 def field_bytes(result):

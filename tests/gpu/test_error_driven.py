@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.error_driven import ErrorDrivenBake
+from gridlight.bake.result import Silent
 from gridlight.bake.session import BakeSession
 from gridlight.core import patches
 from gridlight.core.error_budget import ErrorGoal
@@ -18,7 +19,7 @@ from gridlight.core.snapshot import Material, World
 from gridlight.core.world_suns import extract_suns
 from gridlight.gpu_shaders.probe_paths import ProbePaths
 from gridlight.gpu_shaders.scene_textures import SceneTextures
-from small_scenes import Silent, all_lights, box, cluttered_room, furnace, snapshot_of
+from small_scenes import all_lights, box, cluttered_room, furnace, snapshot_of
 
 GRID = Grid.from_bounds((-0.7, -0.7, -0.6), (0.7, 0.7, 0.7), (2, 2, 2))
 NO_EMITTERS = 0.0

@@ -7,18 +7,9 @@ import pytest
 from gridlight.core.gloss import Gloss
 from gridlight.core.settings import BakeSettings
 from gridlight.core.snapshot import World
+from gridlight.tests.changed_snapshots import with_light, with_material, with_moved
 from small_scenes import bake
-from test_relight import (
-    SETTINGS,
-    assert_same_bake,
-    followed,
-    grid,
-    rooms,
-    session_of,
-    with_light,
-    with_material,
-    with_moved,
-)
+from test_relight import SETTINGS, assert_same_bake, followed, grid, rooms, session_of
 
 pytestmark = pytest.mark.any_version
 

@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 from gridlight.bake.bake_job import BakeJob
+from gridlight.bake.result import Silent
 from gridlight.bake.session import BakeSession
 from gridlight.core.conventions import ACTIVE
 from gridlight.core.gradients import per_cell
@@ -13,9 +14,10 @@ from gridlight.core.steps import Pace, run
 from gridlight.gpu_shaders.live_field import LiveField
 from gridlight.gpu_shaders.textures import read, wait_for_gpu
 from gridlight.gpu_shaders.viewport_field import FieldTextures
+from gridlight.tests.changed_snapshots import with_light, with_material, with_moved
 from gridlight.viewport.live_bake import LiveBake, Target
-from small_scenes import Silent, frame
-from test_relight import SETTINGS, assert_same_bake, grid, rooms, session_of, with_light, with_material, with_moved
+from small_scenes import frame
+from test_relight import SETTINGS, assert_same_bake, grid, rooms, session_of
 
 WHERE = grid((5, 3, 4))
 DARK = np.isin(np.arange(WHERE.count), [7, 8, 22, 37])  # switched off: nodes without light of their own

@@ -8,12 +8,14 @@ import pytest
 from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.block_session import open_session
 from gridlight.bake.job import drive
+from gridlight.bake.result import Silent
 from gridlight.bake.session import BakeSession
 from gridlight.core.gloss import Gloss
 from gridlight.core.grid import Grid
 from gridlight.core.settings import BakeSettings
 from gridlight.core.snapshot import FROM_BEHIND, Image, Light, Material, World
-from small_scenes import Silent, bake, box, frame, snapshot_of
+from gridlight.tests.changed_snapshots import with_light, with_material, with_moved
+from small_scenes import bake, box, frame, snapshot_of
 
 SETTINGS = {"face": 8, "tolerance": 1e-6, "capture": "trace"}
 
@@ -71,24 +73,6 @@ def session_of(snapshot, where=None, **settings):
     session = BakeSession(BakeJob(snapshot, where or grid(), BakeSettings(**{**SETTINGS, **settings})), Silent())
     followed(session.bake())
     return session
-
-
-def with_light(snapshot, index, **values):
-    lights = list(snapshot.lights)
-    lights[index] = replace(lights[index], **values)
-    return replace(snapshot, lights=lights)
-
-
-def with_material(snapshot, index, **values):
-    materials = list(snapshot.materials)
-    materials[index] = replace(materials[index], **values)
-    return replace(snapshot, materials=materials)
-
-
-def with_moved(snapshot, item, offset):
-    vertices = snapshot.vertices.copy()
-    vertices[snapshot.triangles[snapshot.object_index == item].ravel()] += offset
-    return replace(snapshot, vertices=vertices)
 
 
 def without(snapshot, item):

@@ -2,27 +2,23 @@
 """Many bakes in one process hold no more memory and no more of the GPU than a few (``scripts/soak``)."""
 
 import gc
-import importlib.util
 import os
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from gridlight.bake.bake_job import BakeJob
 from gridlight.bake.job import drive
+from gridlight.bake.result import Silent
 from gridlight.bake.session import BakeSession
 from gridlight.core.grid import Grid
 from gridlight.core.settings import BakeSettings
 from gridlight.core.snapshot import Light
-from small_scenes import Silent, box, frame, snapshot_of
+from gridlight.tests import process_size
+from small_scenes import box, frame, snapshot_of
 
 BAKES = int(os.environ.get("GRIDLIGHT_SOAK_BAKES", "200"))
 SETTLED = 50  # bakes after which every shader is compiled and the allocators have found their size
 GROWTH = 1.05
-
-_spec = importlib.util.spec_from_file_location("process_size", Path(__file__).parents[1] / "process_size.py")
-process_size = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(process_size)
 
 
 def bake_one(number: int) -> None:

@@ -4,6 +4,9 @@
 import bpy
 import numpy as np
 from harness import in_blender
+from person import Rectangle
+
+STATUS_BAR_PIXELS = 24
 
 
 def room(person):
@@ -27,6 +30,12 @@ def start(person):
     assert person.module("operators.bake").running_task() is not None
 
 
+def status_bar(person):
+    """The lowest line of the window."""
+    window = person.window
+    return Rectangle(0, window.height - STATUS_BAR_PIXELS, window.width, STATUS_BAR_PIXELS)
+
+
 def has_ended(person):
     bake = person.module("operators.bake")
     assert bake.running_task() is None
@@ -46,6 +55,7 @@ def test_bake_shows_progress_and_stores_light(person):
         if "Bouncing" in seen[-1][1] and "running" not in taken:
             taken.add("running")
             person.picture("running")
+            assert person.find("Esc: cancel", status_bar(person))
         yield 0.02
     shares = [share for share, _ in seen]
     assert shares == sorted(shares) and shares[-1] > 0.3, shares
@@ -124,7 +134,7 @@ def test_loading_a_file_in_the_middle(person):
     yield 0.3
     assert "given up" in has_ended(person)
     assert "Room" not in bpy.data.objects
-    assert not [area for area in person.window.screen.areas if area.type == "STATUSBAR" and area.tag_redraw()]
+    assert not person.find("cancel", status_bar(person))
 
 
 @in_blender(backends=("opengl",))

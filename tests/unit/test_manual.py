@@ -13,6 +13,11 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
 ROOMS = ("core", "scene", "gpu_shaders", "bake", "formats", "viewport", "operators", "panels", "cli", "farm", "tests")
 MAKE = re.compile(r"^([a-z]+):", re.MULTILINE)
+# What pages say of the program.
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+COMMAND = re.compile(r"(?:\./gridlight|--command gridlight) (?:(farm) )?([a-z]+)\b([^`|\n]*)")
+TARGET = re.compile(r"(?:`|^ {4}|  )make ([a-z]+)", re.MULTILINE)
+FILE = re.compile(rf"`((?:{'|'.join(ROOMS)}|docs|scripts)/[\w/]+\.(?:py|glsl|md|txt))")
 
 
 def anchors(text: str) -> set[str]:
@@ -22,10 +27,16 @@ def anchors(text: str) -> set[str]:
     return {title.replace(" ", "-") for title in plain}
 
 
+@pytest.mark.parametrize("pattern", [LINK, COMMAND, TARGET, FILE], ids=["links", "commands", "targets", "files"])
+def test_there_is_something_to_check(pattern):
+    """The tests below say nothing of pages in which they find nothing."""
+    assert sum(len(pattern.findall(page.read_text(encoding="utf-8"))) for page in PAGES) >= 10
+
+
 @pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
 def test_links_lead_somewhere(page):
     text = page.read_text(encoding="utf-8")
-    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+    for target in LINK.findall(text):
         if target.startswith("http"):
             continue
         name, _, anchor = target.partition("#")
@@ -49,8 +60,7 @@ def test_commands_and_options_exist(page):
     from gridlight.cli.main import GRIDLIGHT
     from gridlight.farm.commands import FAMILY as FARM
 
-    line = re.compile(r"(?:\./gridlight|--command gridlight) (?:(farm) )?([a-z]+)\b([^`|\n]*)")
-    for farm, command, words in line.findall(page.read_text()):
+    for farm, command, words in COMMAND.findall(page.read_text()):
         if command == "farm":
             continue
         family = FARM if farm else GRIDLIGHT
@@ -64,14 +74,13 @@ def test_commands_and_options_exist(page):
 @pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
 def test_make_targets_exist(page):
     targets = set(MAKE.findall((ROOT / "Makefile").read_text()))
-    for target in re.findall(r"(?:`|^ {4}|  )make ([a-z]+)", page.read_text(), re.MULTILINE):
+    for target in TARGET.findall(page.read_text()):
         assert target in targets, f"{page.name}: make {target}"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
 def test_files_that_are_named_exist(page):
-    pattern = rf"`((?:{'|'.join(ROOMS)}|docs|scripts)/[\w/]+\.(?:py|glsl|md|txt))"
-    for name in re.findall(pattern, page.read_text()):
+    for name in FILE.findall(page.read_text()):
         assert "NAME" in name or (ROOT / name).exists(), f"{page.name} names {name}"
 
 

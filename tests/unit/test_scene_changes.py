@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from gridlight.core.scene_changes import MOST_BOXES, boxes_around, compare
 from gridlight.core.snapshot import Image, Light, Material, SceneSnapshot, World
+from gridlight.tests.changed_snapshots import with_light, with_material, with_moved
 
 TRIANGLES = 60
 OBJECTS = ["Floor", "Lamp", "Chair", "Chair", "Tree"]
@@ -58,24 +59,6 @@ def flags(changes):
         | ({"lights"} if changes.any_light else set())
         | ({"shape"} if changes.shape and not changes.shape.only_order else set())
     )
-
-
-def with_material(snapshot, index, **values):
-    materials = list(snapshot.materials)
-    materials[index] = replace(materials[index], **values)
-    return replace(snapshot, materials=materials)
-
-
-def with_light(snapshot, index, **values):
-    lights = list(snapshot.lights)
-    lights[index] = replace(lights[index], **values)
-    return replace(snapshot, lights=lights)
-
-
-def with_moved_object(snapshot, index, offset=(0.5, 0.0, 0.0)):
-    vertices = snapshot.vertices.copy()
-    vertices[snapshot.triangles[snapshot.object_index == index].ravel()] += offset
-    return replace(snapshot, vertices=vertices)
 
 
 def reordered(snapshot, order):
@@ -206,7 +189,7 @@ def inside(points, boxes):
 
 def test_one_object_moves():
     old = scene()
-    new = with_moved_object(old, 2)
+    new = with_moved(old, 2)
     changes = compare(old, new)
     assert flags(changes) == {"shape"} and changes.shape.changed == ("Chair",)
     assert changes.shape.triangle_map is None and not changes.shape.added and not changes.shape.removed
@@ -258,7 +241,7 @@ def test_objects_in_another_order_are_no_change():
 
 def test_instances_of_one_name_are_told_apart():
     old = scene()
-    new = with_moved_object(reordered(old, [4, 2, 3, 0, 1]), 2)  # the second chair
+    new = with_moved(reordered(old, [4, 2, 3, 0, 1]), 2)  # the second chair
     changes = compare(old, new)
     assert changes.shape.changed == ("Chair",)
     moved = changes.shape.triangle_map[new.object_index == 2]
@@ -307,7 +290,7 @@ def test_any_set_of_changes_is_told_apart():
         "world": lambda s: replace(s, world=World((9.0, 9, 9))),
         "emission": lambda s: with_material(s, 2, emission=(3.0, 0, 0)),
         "reflectance": lambda s: with_material(s, 1, base_color=(0.1, 0.1, 0.1)),
-        "shape": lambda s: with_moved_object(s, 4),
+        "shape": lambda s: with_moved(s, 4),
     }
     for _ in range(30):
         chosen = {name for name in makers if generator.random() < 0.5}
