@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scenes for ``gridlight bake``, options that make it quick, and what must hold of what it says."""
-
-import json
+"""Scenes for ``gridlight bake``, options that make it quick, and its summary."""
 
 import bpy
+from gridlight.tests.command_line import last_json
 
 SUMMARY_KEYS = [
     "probes",
@@ -59,17 +58,6 @@ def volume(name, location):
 
 
 def summary_of(done):
-    summary = json.loads(done.stdout.splitlines()[-1])
+    summary = last_json(done)
     assert list(summary) == SUMMARY_KEYS
     return summary
-
-
-def assert_one_line(done, status, *words):
-    lines = done.stderr.splitlines()
-    assert done.returncode == status and len(lines) == 1 and not done.stdout, (
-        done.returncode,
-        done.stdout,
-        done.stderr,
-    )
-    for word in words:
-        assert word in lines[0]

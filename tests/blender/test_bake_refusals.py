@@ -2,12 +2,11 @@
 """What ``gridlight bake`` refuses in one line: files, volumes and folders that will not do, a full disk, no driver."""
 
 import os
-import subprocess
-import sys
 
 import bpy
 import pytest
-from bake_command import BOX, assert_one_line, lamp, room, save, volume
+from bake_command import BOX, lamp, room, save, volume
+from gridlight.tests.command_line import assert_one_line, run_on_a_full_disk
 
 
 @pytest.mark.parametrize("kind", ["missing", "truncated", "text", "empty file", "folder", "empty scene", "hidden"])
@@ -69,22 +68,8 @@ def test_folders_that_cannot_be_written(run_gridlight, lit_room, tmp_path, targe
 
 
 @pytest.mark.any_version
-def test_a_full_disk_leaves_nothing(lit_room, tmp_path, root):
-    """A limit on the size of files stands for the disk: writing beyond it fails the same way."""
-    program = (
-        "import resource, runpy, signal, sys\n"
-        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"
-        f"sys.argv = ['gridlight', *sys.argv[1:]]; runpy.run_path({str(root / 'cli' / '__main__.py')!r}, "
-        "run_name='__main__')\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-I", "-c", program, "bake", lit_room, "-o", tmp_path / "out", *BOX, "--quiet"],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=300,
-    )
+def test_a_full_disk_leaves_nothing(lit_room, tmp_path):
+    done = run_on_a_full_disk(4096, "bake", lit_room, "-o", tmp_path / "out", *BOX, "--quiet")
     assert_one_line(done, 2, "cannot write")
     assert not list(tmp_path.iterdir())
 

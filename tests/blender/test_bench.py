@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 
 import pytest
 from gridlight.cli import bench_process
+from gridlight.tests.command_line import last_json
 
 pytestmark = pytest.mark.any_version
 
@@ -99,7 +100,7 @@ def test_a_process_that_hangs_or_fails_leaves_a_reason(peer, limit_s, reason):
 def test_eevee_bakes_the_same_volume_or_says_why_not(run_gridlight):
     done = run_gridlight(*TINY, "--eevee-samples", 1)
     assert done.returncode == 0, done.stderr
-    summary = json.loads(done.stdout.splitlines()[-1])
+    summary = last_json(done)
     rows = [row for row in summary["rows"] if row["peer"] == "EEVEE volume"]
     if rows[-1]["seconds"] is None:
         assert rows[-1]["problem"] and rows[-1]["problem"] in done.stdout
@@ -160,7 +161,7 @@ def test_error_over_time_of_a_room(run_gridlight, tmp_path):
     room = ("--scene", "cornell", "--panoramas", 2, "--error-nodes", 4, "--error-spp", 8, "--budget", 400)
     done = run_gridlight("bench", "pareto", *room, "--face", 8, "--quiet", "-o", tmp_path)
     assert done.returncode == 0, done.stderr
-    (part,) = json.loads(done.stdout.splitlines()[-1])["scenes"]
+    (part,) = last_json(done)["scenes"]
     rows = {(row["peer"], row["setting"]): row for row in part["rows"]}
     assert rows["Gridlight", "default"]["error"]["relative_rms"] < 0.1
     assert rows["Cycles panoramas", "64×32, 8 samples"]["error"]["relative_rms"] < 0.1

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hard cases that only a real .blend can be: what is wrong, far, tiny or numerous in it, from reading to light."""
 
-import json
 from dataclasses import replace
 
 import bpy
@@ -12,6 +11,7 @@ from gridlight.core.panorama import panorama_irradiance
 from gridlight.formats.probe_metadata import scene_hash
 from gridlight.scene.read import read_scene
 from gridlight.tests import scenes
+from gridlight.tests.command_line import last_json
 from hard_room import SIX, difference, irradiance, room, run, textured, volume
 from mathutils import Matrix
 
@@ -251,7 +251,7 @@ def test_deringing_is_done_where_it_is_asked_for_and_said(run_gridlight, tmp_pat
     for name, extra in (("plain", ()), ("deringed", ("--deringing",))):
         done = run_gridlight("bake", tmp_path / "spot.blend", "-o", tmp_path / name, *options, *extra)
         assert done.returncode == 0, done.stderr
-        summaries.append(json.loads(done.stdout.splitlines()[-1]))
+        summaries.append(last_json(done))
     plain, deringed = summaries
     assert plain["ringing"]["negative"] > 0 and plain["ringing"]["lowest"] < -0.01
     assert plain["settings"]["deringing"] is False and deringed["settings"]["deringing"] is True

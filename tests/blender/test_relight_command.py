@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``gridlight bake --relight`` as a user calls it: other files and frames, with counters that say what was kept."""
 
-import json
-
 import bpy
 import numpy as np
 import pytest
 from gridlight.formats import probe_file
+from gridlight.tests.command_line import last_json
 
 BOX = ["--min", "-1.5,-1.5,-1.5", "--max", "1.5,1.5,1.5", "--resolution", "3,3,3", "--face", 4, "--tolerance", "1e-6"]
 
@@ -48,7 +47,7 @@ def test_relighting_other_files_and_frames(run_gridlight, files, tmp_path):
         "bake", files["base"], "-o", out, *BOX, "--no-pictures", *(a for s in states for a in ("--relight", s))
     )
     assert done.returncode == 0, done.stderr
-    summary = json.loads(done.stdout.splitlines()[-1])
+    summary = last_json(done)
     entries = summary["relight"]
     assert [entry["state"] for entry in entries] == [str(state) for state in states]
     assert [entry["file"] for entry in entries] == [str(out / f"probes_relit{i}.exr") for i in (1, 2, 3)]

@@ -10,6 +10,7 @@ from gridlight.core.field import Field
 from gridlight.core.grid import Grid
 from gridlight.formats import probe_file
 from gridlight.tests import scenes
+from gridlight.tests.command_line import last_json
 
 EMISSION = 2.0
 
@@ -69,7 +70,7 @@ def test_light_below_zero_is_counted(furnace, run_gridlight, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert "below zero" in done.stdout
-    summary = json.loads(done.stdout.splitlines()[-1])
+    summary = last_json(done)
     negative = summary["points"]["probes"]["negative"]
     assert (negative["count"], negative["values"]) == (9, 54)
     lowest = np.pi * 0.28209479177387814 - 2 * 2 * np.pi / 3 * 0.4886025119029199

@@ -13,6 +13,7 @@ from gridlight.core.conventions import CULLED
 from gridlight.core.grid import Grid
 from gridlight.formats import probe_file
 from gridlight.formats.export import TARGETS, ExportOptions, export
+from gridlight.tests.command_line import assert_one_line, last_json
 
 
 @pytest.fixture(scope="module")
@@ -22,17 +23,10 @@ def probes(tmp_path_factory):
     return path
 
 
-def assert_refused(done, *words):
-    assert (done.returncode, done.stdout) == (2, ""), done.stderr
-    assert done.stderr.startswith("gridlight: ") and len(done.stderr.splitlines()) == 1
-    for word in words:
-        assert word in done.stderr
-
-
 def test_a_run_names_its_files_and_losses(run_gridlight, probes, tmp_path):
     done = run_gridlight("export", probes, "--to", "bevy", "-o", tmp_path / "hall.ktx2", "--bands", 2)
     assert done.returncode == 0, done.stderr
-    summary = json.loads(done.stdout.splitlines()[-1])
+    summary = last_json(done)
     assert summary["files"] == [str(tmp_path / "hall.ktx2"), str(tmp_path / "hall.conventions.json")]
     assert summary["warnings"] == [] and any("visibility" in loss for loss in summary["does_not_carry"])
     assert "bevy does not carry visibility weights" in done.stderr and "bands above 2" in done.stderr
@@ -68,14 +62,14 @@ def test_quiet_and_axes_that_start_with_a_minus(run_gridlight, probes, tmp_path)
 )
 def test_what_is_wrong_is_one_line(run_gridlight, probes, tmp_path, options, words):
     options = [option.format(out=tmp_path / "out") for option in options]
-    assert_refused(run_gridlight("export", probes, *options), *words)
+    assert_one_line(run_gridlight("export", probes, *options), 2, *words)
     assert not any(tmp_path.iterdir())
 
 
 def test_a_damaged_probe_file_is_one_line(run_gridlight, probes, tmp_path):
     cut = tmp_path / "cut.exr"
     cut.write_bytes(probes.read_bytes()[:-100])
-    assert_refused(run_gridlight("export", cut, "--to", "json", "-o", tmp_path / "out"), "cut.exr", "damaged")
+    assert_one_line(run_gridlight("export", cut, "--to", "json", "-o", tmp_path / "out"), 2, "cut.exr", "damaged")
 
 
 def test_export_loads_no_blender(probes, tmp_path, root):

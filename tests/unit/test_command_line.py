@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The command line without Blender: arguments, exit statuses, one-line errors, eval, info, diff, broken pipes."""
 
-import json
 import os
 import signal
 import subprocess
@@ -16,6 +15,7 @@ from gridlight.core.conventions import CULLED
 from gridlight.core.field import Field
 from gridlight.core.grid import Grid
 from gridlight.formats import probe_file
+from gridlight.tests.command_line import assert_one_line, last_json, run_on_a_full_disk
 
 Y00 = 0.28209479177387814
 
@@ -32,21 +32,8 @@ def constant_file(tmp_path):
     return path
 
 
-def last_json(done):
-    return json.loads(done.stdout.splitlines()[-1])
-
-
-def assert_one_line(done, status, *words):
-    """The command ended with ``status`` and said exactly one line, which holds ``words``."""
-    lines = done.stderr.splitlines()
-    assert done.returncode == status, done.stderr
-    assert len(lines) == 1 and not done.stdout, (done.stdout, lines)
-    for word in words:
-        assert word in lines[0]
-
-
-# --- arguments
-# ---------------------------------------------------------------------------------------------------------
+# Arguments
+# ----------------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -130,8 +117,8 @@ def test_help_names_the_commands(run_gridlight):
         assert command in done.stdout
 
 
-# --- info and diff
-# -----------------------------------------------------------------------------------------------------
+# Info and diff
+# ----------------------------------------------------------------------------------------------------------------------
 
 
 def test_info_says_what_the_file_holds(run_gridlight, constant_file):
@@ -206,8 +193,8 @@ def test_diff_of_different_grids_is_refused(run_gridlight, constant_file, tmp_pa
     assert_one_line(run_gridlight("diff", constant_file, other), 2, "different grids")
 
 
-# --- eval
-# --------------------------------------------------------------------------------------------------------------
+# Eval
+# ----------------------------------------------------------------------------------------------------------------------
 
 
 def test_eval_of_constant_radiance_is_pi_times_it(run_gridlight, constant_file, tmp_path):
@@ -288,41 +275,16 @@ def test_eval_into_places_that_cannot_be_written(run_gridlight, constant_file, t
     assert_one_line(run_gridlight("eval", constant_file, "--points", tmp_path / "p.csv", "-o", target), 2, *words)
 
 
-def test_eval_on_a_full_disk(constant_file, tmp_path, root):
-    """A limit on the size of files stands for the disk: writing beyond it fails the same way."""
-    (tmp_path / "p.csv").write_text("x,y,z,nx,ny,nz\n" + "0,0,0,0,0,1\n" * 2000)
-    program = (
-        "import resource, runpy, signal, sys\n"
-        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))\n"
-        f"sys.argv = ['gridlight', *sys.argv[1:]]; runpy.run_path({str(root / 'cli' / '__main__.py')!r}, "
-        "run_name='__main__')\n"
-    )
-    out = tmp_path / "out"
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-I",
-            "-c",
-            program,
-            "eval",
-            constant_file,
-            "--points",
-            tmp_path / "p.csv",
-            "-o",
-            out / "e.csv",
-        ],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
+def test_eval_on_a_full_disk(constant_file, tmp_path):
+    points, out = tmp_path / "p.csv", tmp_path / "out"
+    points.write_text("x,y,z,nx,ny,nz\n" + "0,0,0,0,0,1\n" * 2000)
+    done = run_on_a_full_disk(10_000, "eval", constant_file, "--points", points, "-o", out / "e.csv")
     assert_one_line(done, 2, "cannot write", "too large")
     assert not out.exists()
 
 
-# --- pipes
-# -------------------------------------------------------------------------------------------------------------
+# Pipes
+# ----------------------------------------------------------------------------------------------------------------------
 
 
 def test_a_reader_that_leaves_gets_no_traceback(constant_file, root):
@@ -340,8 +302,8 @@ def test_a_reader_that_leaves_gets_no_traceback(constant_file, root):
     assert done.returncode == 0 and done.stderr == ""
 
 
-# --- interrupts
-# --------------------------------------------------------------------------------------------------------
+# Interrupts
+# ----------------------------------------------------------------------------------------------------------------------
 
 
 def wait_until_it_listens(pid):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from export_fields import Y_UP
 from gridlight.formats import probe_file
+from gridlight.tests.command_line import last_json
 from viewer_pixels import measured, where_it_looks
 
 HERE = Path(__file__).parent
@@ -26,9 +27,7 @@ def room(tmp_path_factory, run_gridlight):
     assert done.returncode == 0, done.stderr
     done = run_gridlight("export", folder / "bake/probes.exr", "--to", "three", "-o", folder / "web", "--scene", blend)
     assert done.returncode == 0, done.stderr
-    assert {"scene.glb", "scene.json"} <= {
-        Path(name).name for name in json.loads(done.stdout.splitlines()[-1])["files"]
-    }
+    assert {"scene.glb", "scene.json"} <= {Path(name).name for name in last_json(done)["files"]}
     return folder
 
 
