@@ -21,7 +21,8 @@ from .volume_choice import can_read_scene, chosen_volumes, has_volume, in_object
 
 _INTERVAL_SECONDS = 0.01  # between two timer events
 BUDGET_SECONDS = STEP_SECONDS  # of work in one; the last step that begins in it may take as long again
-_REDRAW_SECONDS = 0.1
+_REDRAW_SECONDS, _MOST_REDRAW_SECONDS = 0.1, 1.0  # between two pictures of the progress
+_REDRAW_SHARE = 0.2  # of the time that they may take: in software a window takes longer than a step
 
 _running: _Job | None = None
 _last_failure = ""
@@ -35,17 +36,27 @@ class _Job:
         self._manager = context.window_manager
         self._workspaces = [window.workspace for window in self._manager.windows]
         self._timer = self._manager.event_timer_add(_INTERVAL_SECONDS, window=context.window)
-        self._drawn = 0.0
+        self._shown = 0.0  # time.monotonic() of the last picture of the progress
+        self._is_drawing = False  # that picture is on its way
+        self._pause_seconds = _REDRAW_SECONDS
         self._manager.progress_begin(0, 100)
+        viewport.stand_still(True)
         for handlers in _interruptions():
             handlers.append(_interrupted)
+
+    def look_at_clock(self) -> None:
+        """Call first when Blender comes back: what it has drawn meanwhile says how often that can be."""
+        if self._is_drawing:
+            self._is_drawing = False
+            wanted = (time.monotonic() - self._shown) / _REDRAW_SHARE
+            self._pause_seconds = min(max(wanted, _REDRAW_SECONDS), _MOST_REDRAW_SECONDS)
 
     def show(self) -> None:
         """Brings progress to cursor, status bar and panels, now and then."""
         now = time.monotonic()
-        if now - self._drawn < _REDRAW_SECONDS:
+        if now - self._shown < self._pause_seconds:
             return
-        self._drawn = now
+        self._shown, self._is_drawing = now, True
         progress = self.task.progress
         self._manager.progress_update(int(100 * progress.share))
         for workspace in self._workspaces:
@@ -59,6 +70,7 @@ class _Job:
             return
         _running, _last_failure = None, failure
         self.task.close()
+        viewport.stand_still(False)
         self._manager.event_timer_remove(self._timer)
         self._manager.progress_end()
         for workspace in self._workspaces:
@@ -113,6 +125,7 @@ class _BakesVolumes:
         job = self._job
         if _running is not job:  # ended from outside, and this is the first event since
             return {"CANCELLED", "PASS_THROUGH"}
+        job.look_at_clock()
         if event.type == "ESC" and event.value == "PRESS":
             job.task.stop("The bake was cancelled; everything is as it was")
         elif event.type != "TIMER" and not job.task.stopped:

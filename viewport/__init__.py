@@ -33,3 +33,10 @@ def field_changed(volume_object) -> None:
     from . import changes, sessions
 
     sessions.mark_all(changes.FIELDS)
+
+
+def stand_still(is_wanted: bool) -> None:
+    """Views neither refine their pictures nor let light follow, until told otherwise."""
+    from . import handlers
+
+    handlers.stand_still(is_wanted)

@@ -24,6 +24,7 @@ _IDLE_SECONDS = 0.2  # between looks whether anybody still needs a session
 _PULL = 1e-3  # share of the distance by which the preview stands before what Blender drew at the same place
 
 images = ViewImages()
+_stands_still = False  # light does not follow now
 _draw_handles: list[object] = []
 
 
@@ -82,6 +83,13 @@ def stop() -> None:
     sessions.drop_all()
     images.clear()
     _stop_noticing()
+
+
+def stand_still(is_wanted: bool) -> None:
+    """Until told otherwise views show what they have and what is edited, but no light follows and no picture is
+    refined: a bake, whose light takes the place of that, gets the time."""
+    global _stands_still
+    _stands_still = images.is_rough = is_wanted
 
 
 def request(scene: bpy.types.Scene) -> sessions.SceneSession:
@@ -183,7 +191,7 @@ def _tick() -> float | None:
         version = session.version
         session.update(scene, _view_layer(scene))
         preview = scene.gridlight.preview
-        if preview.live and preview.enabled:
+        if preview.live and preview.enabled and not _stands_still:
             session.relight(scene, _left_for_light(preview.frame_budget_ms / 1000, session))
             busy |= session.is_relighting
         busy |= session.is_pending

@@ -45,6 +45,11 @@ class ViewImages:
 
     def __init__(self):
         self._images: dict[tuple[int, int], _RegionImage] = {}
+        self.is_rough = False  # one sample does: somebody else needs the time
+
+    @property
+    def _wanted_samples(self) -> int:
+        return 1 if self.is_rough else SAMPLES
 
     def clear(self) -> None:
         self._images.clear()
@@ -58,7 +63,7 @@ class ViewImages:
     def needs_drawing(self, area: bpy.types.Area) -> bool:
         """Does a picture in ``area`` want more samples?"""
         return any(
-            image.picture is not None and (image.picture.samples < SAMPLES or image.coarseness > 1)
+            image.picture is not None and (image.picture.samples < self._wanted_samples or image.coarseness > 1)
             for (owner, _), image in self._images.items()
             if owner == area.as_pointer()
         )
@@ -104,13 +109,12 @@ class ViewImages:
                 image.seconds_per_pixel = (time.perf_counter() - started) / pixels
         return image.picture, view
 
-    @staticmethod
-    def _samples_now(image: _RegionImage) -> int:
-        """Samples for this redraw: one, or as many as hardly take time."""
+    def _samples_now(self, image: _RegionImage) -> int:
+        """Samples for this redraw: one, or as many as hardly take time; none where the picture has all it wants."""
         picture = image.picture
         expected = image.seconds_per_pixel * picture.width * picture.height
         quick = int(_SAMPLING_SECONDS / expected) if expected > 0 else 1
-        return min(max(quick, 1), SAMPLES - picture.samples)
+        return min(max(quick, 1), self._wanted_samples - picture.samples)
 
     @staticmethod
     def _coarseness(image: _RegionImage, region: bpy.types.Region) -> int:

@@ -179,14 +179,6 @@ def textured_room(image):
     return read_scene(scene)
 
 
-def flat_image(name, width, height, color, space="sRGB"):
-    image = bpy.data.images.new(name, width, height)
-    image.colorspace_settings.name = space
-    image.generated_color = (*color, 1.0)
-    image.pixels[:4]
-    return image
-
-
 @pytest.mark.parametrize(
     "size",
     [

@@ -15,7 +15,6 @@ from gridlight.farm import plan as plan_command
 
 ROOT = Path(__file__).resolve().parents[2]
 FARM = ROOT / "farm" / "__main__.py"
-DASK = ROOT / ".venv-farm" / "bin" / "dask"
 OPTIONS = "--min -2,-2,0.2 --max 2,2,1.4 --resolution 4,4,2 --face 4 --block 8 --keep-all --capture trace".split()
 
 
