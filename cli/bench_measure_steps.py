@@ -14,8 +14,8 @@ import bpy
 from .. import operators
 from ..core.grid import Grid
 from ..core.settings import BakeSettings
+from ..core.steps import STEP_SECONDS
 from ..gpu_shaders.textures import wait_for_gpu
-from ..operators.bake import BUDGET_SECONDS
 from ..operators.bake_task import BakeTask
 from ..operators.volume_choice import volumes_of
 from ..scene.volumes import create_volume
@@ -29,7 +29,7 @@ def bake_steps(
     """Bakes all volumes of ``scene``, or one of ``grid`` where it has none, once and then some times warm.
 
     Returns:
-        Series of seconds, of steps and of timer events, which hold as many steps as their budget allows; and the
+        Series of seconds, of steps and of timer events, which hold as many steps as there is time for; and the
         longest warm step of each phase.
     """
     if not hasattr(bpy.types.Scene, "gridlight"):
@@ -67,7 +67,7 @@ def _bake(scene: bpy.types.Scene, should_stop) -> tuple[list[float], list[float]
     while True:
         event_began = time.perf_counter()
         try:
-            while time.perf_counter() < event_began + BUDGET_SECONDS:
+            while time.perf_counter() < event_began + STEP_SECONDS:
                 phase, began = task.progress.phase_name, time.perf_counter()
                 next(task)
                 wait_for_gpu()

@@ -34,7 +34,8 @@ RUN_IN_ENGINE = True
 DOES_NOT_CARRY = [
     "visibility weights: light leaks through walls thinner than a cell; three.js looks half a cell along the normal "
     "instead",
-    "gradients of probes: between probes light is blended straight, coarser than in the preview; --refine follows them",
+    "gradients of probes: between probes light is blended straight, coarser than in the preview; the command line's "
+    "--refine follows them",
     "a rotated volume: it is resampled along the axes",
     "light outside the box of cells: three.js has none there, Gridlight continues the outermost probes",
     "which probes are culled or invalid",

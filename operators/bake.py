@@ -11,18 +11,15 @@ from bpy.props import BoolProperty
 
 from .. import viewport
 from ..core.errors import Cancelled, GridlightError
-from ..core.steps import STEP_SECONDS
 from ..scene.field_storage import remove_field, stored_text
 from . import kept_bakes, names, stale
 from .bake_task import BakeTask
 from .libraries import cannot_keep
 from .sidebar import redraw_sidebars
+from .turns import Turns
 from .volume_choice import can_read_scene, chosen_volumes, has_volume, in_object_mode, volumes_of
 
 _INTERVAL_SECONDS = 0.01  # between two timer events
-BUDGET_SECONDS = STEP_SECONDS  # of work in one; the last step that begins in it may take as long again
-_REDRAW_SECONDS, _MOST_REDRAW_SECONDS = 0.1, 1.0  # between two pictures of the progress
-_REDRAW_SHARE = 0.2  # of the time that they may take: in software a window takes longer than a step
 
 _running: _Job | None = None
 _last_failure = ""
@@ -36,27 +33,26 @@ class _Job:
         self._manager = context.window_manager
         self._workspaces = [window.workspace for window in self._manager.windows]
         self._timer = self._manager.event_timer_add(_INTERVAL_SECONDS, window=context.window)
-        self._shown = 0.0  # time.monotonic() of the last picture of the progress
-        self._is_drawing = False  # that picture is on its way
-        self._pause_seconds = _REDRAW_SECONDS
+        self._turns = Turns()
         self._manager.progress_begin(0, 100)
         viewport.stand_still(True)
         for handlers in _interruptions():
             handlers.append(_interrupted)
 
-    def look_at_clock(self) -> None:
-        """Call first when Blender comes back: what it has drawn meanwhile says how often that can be."""
-        if self._is_drawing:
-            self._is_drawing = False
-            wanted = (time.monotonic() - self._shown) / _REDRAW_SHARE
-            self._pause_seconds = min(max(wanted, _REDRAW_SECONDS), _MOST_REDRAW_SECONDS)
+    def work(self) -> None:
+        """One turn.
 
-    def show(self) -> None:
-        """Brings progress to cursor, status bar and panels, now and then."""
-        now = time.monotonic()
-        if now - self._shown < self._pause_seconds:
-            return
-        self._shown, self._is_drawing = now, True
+        Raises:
+            StopIteration: the task is done.
+        """
+        deadline = self._turns.begin()
+        while time.perf_counter() < deadline:
+            next(self.task)
+        if self._turns.end():
+            self._show()
+
+    def _show(self) -> None:
+        """Brings progress to cursor, status bar and panels."""
         progress = self.task.progress
         self._manager.progress_update(int(100 * progress.share))
         for workspace in self._workspaces:
@@ -125,7 +121,6 @@ class _BakesVolumes:
         job = self._job
         if _running is not job:  # ended from outside, and this is the first event since
             return {"CANCELLED", "PASS_THROUGH"}
-        job.look_at_clock()
         if event.type == "ESC" and event.value == "PRESS":
             job.task.stop("The bake was cancelled; everything is as it was")
         elif event.type != "TIMER" and not job.task.stopped:
@@ -133,10 +128,8 @@ class _BakesVolumes:
         if context.mode != "OBJECT":
             job.task.stop("The bake was given up, because the mode was changed")
         job.task.check()
-        deadline = time.perf_counter() + BUDGET_SECONDS
         try:
-            while time.perf_counter() < deadline:
-                next(job.task)
+            job.work()
         except StopIteration:
             job.end("")
             return self._finished(context, job.task)
@@ -146,7 +139,6 @@ class _BakesVolumes:
         except Exception:  # a bug: it must not leave timer and status text behind, and goes on to Blender's console
             job.end("The bake failed; the console says more")
             raise
-        job.show()
         return {"RUNNING_MODAL"} if event.type == "ESC" else {"PASS_THROUGH"}
 
     def cancel(self, _context):

@@ -24,7 +24,9 @@ class GRIDLIGHT_PT_bake(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         settings = context.scene.gridlight
-        layout.row(align=True).prop(settings, "quality", expand=True)
+        row = layout.row(align=True)
+        row.active = not settings.use_error
+        row.prop(settings, "quality", expand=True)
         quality = QUALITIES.get(settings.quality)
         row = layout.row(align=True)
         row.prop(settings, "use_error", text="")
@@ -39,7 +41,7 @@ class GRIDLIGHT_PT_bake(SidebarPanel, bpy.types.Panel):
         elif settings.use_error:
             row.label(text="Settings are chosen for this error")
         elif quality:
-            row.label(text=f"In the gallery: {quality.error_percent:.1f} % off path tracing")
+            row.label(text=f"{quality.error_percent:.1f} % off path tracing in the gallery")
         else:
             row.label(text="Error of these settings: not measured")
         row = layout.row(align=True)
@@ -66,13 +68,13 @@ class GRIDLIGHT_PT_bake_settings(SidebarPanel, bpy.types.Panel):
             layout.enabled = False
         column = layout.column()
         column.prop(settings, "bands")
-        column.prop(settings, "face")
-        column.prop(settings, "samples")
+        _chosen(column, settings, "face")
+        _chosen(column, settings, "samples")
         column.prop(settings, "gather")
         column = layout.column(heading="Bounces")
         column.prop(settings, "bounces_auto", text="Until Settled")
         if settings.bounces_auto:
-            column.prop(settings, "tolerance")
+            _chosen(column, settings, "tolerance")
         else:
             column.prop(settings, "bounces")
         column = layout.column()
@@ -81,6 +83,13 @@ class GRIDLIGHT_PT_bake_settings(SidebarPanel, bpy.types.Panel):
         column.prop(settings, "memory_mib")
         column.prop(settings, "keep_all")
         column.prop(settings, "deringing")
+
+
+def _chosen(column, settings, name: str) -> None:
+    """A setting that a target error chooses: dim where there is one."""
+    row = column.row()
+    row.active = not settings.use_error
+    row.prop(settings, name)
 
 
 def _buttons(row, context) -> None:
@@ -105,10 +114,10 @@ def _state(layout, context) -> None:
         reason = unreadable(volume) if volume else ""
         if reason:
             row = layout.row()
-            paragraph(row, context, reason[0].upper() + reason[1:], "ERROR", buttons=1)
+            paragraph(row, context, _sentence(reason), "ERROR", buttons=1)
             row.operator(names.CLEAR_BAKE, text="", icon="TRASH")
         if last_failure():
-            paragraph(layout, context, last_failure(), "INFO")
+            paragraph(layout, context, _sentence(last_failure()), "INFO")
         return
     state = state_of(context.scene, volume)
     row = layout.row()
@@ -126,11 +135,19 @@ def _state(layout, context) -> None:
     else:
         row.label(text="The light is up to date", icon="CHECKMARK")
     row.operator(names.CLEAR_BAKE, text="", icon="TRASH")
-    paragraph(layout, context, last_failure() or stored_details(volume).get("outcome", ""), "BLANK1")
+    if last_failure():
+        paragraph(layout, context, _sentence(last_failure()), "INFO")
+    else:
+        paragraph(layout, context, stored_details(volume).get("outcome", ""), "BLANK1")
     warnings = len(metadata.get("warnings", []))
     if warnings:
         text = "1 warning: see Report" if warnings == 1 else f"{warnings} warnings: see Report"
         layout.label(text=text, icon="ERROR")
+
+
+def _sentence(text: str) -> str:
+    """Errors begin with a small letter: on the command line they stand behind the program's name."""
+    return text[0].upper() + text[1:]
 
 
 def _what_changed(scene, volume) -> str:

@@ -33,6 +33,9 @@ def _figures(layout, context, metadata: dict, details: dict) -> None:
         ("Settled", "yes" if metadata.get("converged") else "no, some light is still missing"),
         ("Frame", str(metadata.get("scene", {}).get("frame", "–"))),
     ]
+    error = metadata.get("error") or {}
+    if error.get("predicted") is not None:
+        rows.append(("Error", f"{100 * error['predicted']:.1f} %, asked for {100 * error['target']:.3g} %"))
     rows += [(phase.capitalize(), f"{seconds:.2f} s") for phase, seconds in details.get("seconds", {}).items()]
     for name, value in rows:
         split = layout.split(factor=0.4)

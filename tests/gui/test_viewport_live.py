@@ -124,3 +124,30 @@ def test_light_follows_during_playback_and_undo(person):
     yield 0.3
     assert bool(handlers._draw_handles) == bpy.context.scene.gridlight.preview.enabled
     bpy.context.scene.gridlight.preview.enabled = False
+
+
+@in_blender(backends=("opengl",), timeout=180.0)
+def test_previews_rest_while_a_bake_runs(person):
+    """Its light takes the place of theirs, and they would take the time of the bake. What is edited is seen."""
+    volume = lit_room.build(person, lamp=True)
+    volume.gridlight_grid.resolution = (9, 9, 9)
+    lamp = bpy.data.objects["Light"]
+    lamp.location, lamp.data.energy = (2.0, 0.0, 0.0), 300
+    person.window.view_layer.objects.active = volume
+    lit_room.switch(enabled=True, live=True)
+    yield from lit_room.drawn(person)
+    operators, handlers = person.module("operators.bake"), person.module("viewport.handlers")
+    session = person.module("viewport.sessions").existing()[0]
+    assert person.do("gridlight.bake", invoke=True) == {"RUNNING_MODAL"}
+    yield 0.1
+    before, follows, samples = session.version, [], []
+    while operators.running_task() is not None:
+        lamp.location.x -= 0.01
+        follows.append(session._live.is_working)
+        samples += [image.picture.samples for image in handlers.images._images.values() if session.version > before]
+        yield 0.05
+    assert samples and max(samples) == 1 and not any(follows), (samples, follows)
+    yield from lit_room.drawn(person)
+    finished = person.module("viewport.view_images").SAMPLES
+    assert [image.picture.samples for image in handlers.images._images.values()] == [finished]
+    lit_room.switch(enabled=False)
