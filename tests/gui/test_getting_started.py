@@ -12,9 +12,11 @@ import bpy
 import lit_room
 import numpy as np
 from harness import in_blender
+from person import Rectangle
 
 GUIDE = Path(__file__).parents[2] / "docs" / "getting_started.md"
 CHECKBOX_PIXELS = 12  # from the title of a panel to the box before it
+MENU_PIXELS = 160  # wide
 
 
 class Reader:
@@ -84,8 +86,7 @@ def look(person, guide):
     assert left_half(np.abs(full - before)).mean() > 5
     person.picture("preview")
     yield from person.scroll(6)
-    yield from person.click_text("Full")
-    yield from person.click_text("Indirect", person.rectangle())
+    yield from choose(person, "Full", "Indirect")
     assert preview.mode == "INDIRECT"
     yield from lit_room.drawn(person, 120)
     assert left_half(np.abs(person.look(person.rectangle()) - full)).mean() > 5
@@ -149,10 +150,7 @@ def take_it_along(person, guide):
     folder = Path(bpy.app.tempdir) / "guide"
     export.directory = str(folder)
     yield from person.scroll(30)
-    yield from person.click_text("Probe File")
-    for engine in ("three.js", "Godot", "Unity", "Bevy"):
-        assert person.find(engine, person.rectangle()), engine
-    yield from person.click_text("Godot", person.rectangle())
+    yield from choose(person, "Probe File", "Godot", beside=("three.js", "Unity", "Bevy"))
     assert export.target == "godot"
     yield from person.click_text(guide.next_label("Export"), (yield from person.below("Folder")))
     yield from person.wait_until(lambda: folder.exists() and any(folder.iterdir()), "the files")
@@ -176,6 +174,17 @@ def your_own_scene(person, guide):
     assert person.find("To Selection", sidebar(person)) and person.find("Spacing", sidebar(person))
     yield from person.click_text("Fit to Scene")
     assert np.allclose(volume.matrix_world, box, atol=1e-4)
+
+
+def choose(person, now, then, beside=()):
+    """Opens the menu of the sidebar that shows ``now`` and clicks ``then``; it also lists what is ``beside``."""
+    menu = person.find(now, sidebar(person))
+    yield from person.click(*menu.center)
+    view = person.rectangle()
+    column = Rectangle(menu.x - MENU_PIXELS // 4, view.y, MENU_PIXELS, view.height)  # labels stand to its left
+    for item in beside:
+        assert person.find(item, column), item
+    yield from person.click_text(then, column)
 
 
 def sidebar(person):
