@@ -106,12 +106,14 @@ def look(person, guide):
 
 def move_a_light(person, guide):
     from bpy_extras import view3d_utils
+    from mathutils import Vector
 
     scene, operators = person.window.scene, person.module("operators.bake")
     shown = person.look(person.rectangle()).astype(float)
     lamp = scene.objects["Room ceiling light"]
     region, region_3d = person.region(), person.area().spaces.active.region_3d
-    place = view3d_utils.location_3d_to_region_2d(region, region_3d, lamp.matrix_world.translation)
+    long_side = lamp.matrix_world @ Vector((0.0, 0.5 * lamp.data.size_y, 0.0))
+    place = view3d_utils.location_3d_to_region_2d(region, region_3d, long_side)
     view = person.rectangle()
     yield from person.click(int(view.x + place.x), int(view.y + view.height - place.y))
     assert person.window.view_layer.objects.active == lamp and lamp.select_get()
