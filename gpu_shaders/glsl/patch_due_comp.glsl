@@ -2,9 +2,9 @@
 /* Lists patches that are due, see patch_due_lib, and notes the number of samples that they get. Nobody waits for that
  * note: a patch is due for one list at most, whatever the note says.
  *
- * Dispatch: one group of 256 threads a block; y = lists, z = parts of the light. `due` has patch_count elements for each
- * list of each part, lists of one part after the other; elements of `due_counts` from
- * `result` on are their lengths.
+ * Dispatch: one group of 256 threads a block; y = lists, z = parts of the light. `due` has patch_count elements for
+ * each list of each part, lists of one part after the other; elements of `due_counts` from `result` on are their
+ * lengths.
  */
 
 void note_class(int patch_index, int sample_class)
