@@ -66,6 +66,12 @@ class Stop:
     def ask(self, _number=None, _frame=None):
         self.asked = True
 
+    def interrupt(self, _number, _frame):
+        """For work that may not ask for long. Python drops exceptions that are raised in destructors: then it is left
+        to the next question."""
+        self.asked = True
+        raise KeyboardInterrupt
+
 
 def main(argv: list[str], in_blender: bool = False, family: Family = GRIDLIGHT) -> int:
     """Runs one command line and returns its exit status. ``in_blender``: called by ``blender --command gridlight``."""
@@ -139,7 +145,7 @@ def _run(argv: list[str], in_blender: bool, child: bool, family: Family) -> int:
         worker.accept_interrupts(stop.ask)
     elif not in_blender:
         for number in worker.INTERRUPTS:
-            signal.signal(number, signal.default_int_handler)
+            signal.signal(number, stop.interrupt)
     reporter = Reporter(quiet=getattr(args, "quiet", False))
     try:
         summary, status = module.run(args, reporter, stop)

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gridlight.cli import arguments
+from gridlight.cli.main import Stop
 from gridlight.core.conventions import CULLED
 from gridlight.core.field import Field
 from gridlight.core.grid import Grid
@@ -344,3 +345,17 @@ def test_an_interrupt_at_any_time_ends_eval_without_traceback(constant_file, tmp
     output, errors = process.communicate(timeout=60)
     assert process.returncode == 130 and errors.splitlines()[-1] == "gridlight: cancelled"
     assert "Traceback" not in errors and not output and not out.exists()
+
+
+def test_an_interrupt_that_python_drops_stops_at_the_next_question(monkeypatch):
+    """Exceptions of destructors come to nothing."""
+    stop, dropped = Stop(), []
+    monkeypatch.setattr(sys, "unraisablehook", lambda lost: dropped.append(lost.exc_type))
+
+    class Interrupted:
+        def __del__(self):
+            stop.interrupt(signal.SIGINT, None)
+
+    assert not stop()
+    Interrupted()
+    assert dropped == [KeyboardInterrupt] and stop()
