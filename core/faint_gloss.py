@@ -23,13 +23,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .gloss import NO_GLOSS, Gloss
+from .gloss import DIELECTRIC, NO_GLOSS, Gloss
 
-# Schlick's (1 − cos)⁵ over the facets that a view at the angle θ sees is about s·(1 − cos θ)ᵖ: s and p by roughness,
-# fitted to what core/gloss.py draws.
+# How what facets mirror grows (core/gloss.py), over those that a view at the angle θ sees, is about s·(1 − cos θ)ᵖ: s
+# and p by roughness, fitted to what core/gloss.py draws; of dielectrics to what leaves after one reflection, as Cycles
+# gives nothing back to those of what is lost between facets, most of it at grazing angles.
 _ROUGHNESS = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0])
 _GRAZING = np.array([0.979, 0.933, 0.718, 0.485, 0.314, 0.206, 0.138, 0.071, 0.043])
 _POWER = np.array([4.82, 4.64, 3.94, 3.32, 2.94, 2.76, 2.66, 2.68, 2.78])
+_DIELECTRIC_GRAZING = np.array([0.874, 0.827, 0.628, 0.421, 0.278, 0.193, 0.150, 0.132, 0.177])
+_DIELECTRIC_POWER = np.array([4.40, 4.24, 3.62, 3.04, 2.68, 2.52, 2.50, 2.44, 2.32])
 
 
 def faint_rows(glosses: Sequence[Gloss | None]) -> np.ndarray:
@@ -38,9 +41,10 @@ def faint_rows(glosses: Sequence[Gloss | None]) -> np.ndarray:
     rows = np.zeros((max(len(glosses), 1), 3, 4), np.float32)
     for row, gloss in zip(rows, glosses):
         gloss = gloss or NO_GLOSS
-        power = np.interp(gloss.roughness, _ROUGHNESS, _POWER)
-        grazing = np.interp(gloss.roughness, _ROUGHNESS, _GRAZING)
         facing = np.array(gloss.facing)
+        dielectric = facing.max() < DIELECTRIC
+        power = np.interp(gloss.roughness, _ROUGHNESS, _DIELECTRIC_POWER if dielectric else _POWER)
+        grazing = np.interp(gloss.roughness, _ROUGHNESS, _DIELECTRIC_GRAZING if dielectric else _GRAZING)
         row[0] = (*gloss.share, power)
         row[1, :3] = (1 - facing) * grazing / (facing + (1 - facing) * grazing * _mean(power))
         row[1, 3] = gloss.fixed

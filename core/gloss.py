@@ -3,11 +3,15 @@
 
 A material sends back its albedo A in all. Of that, S is mirrored by microfacets (A · share, or where a coat lies over a
 pattern the same everywhere), the rest D = A − S leaves in all directions. Facets are GGX of width α = roughness²; what
-one reflects grows towards grazing angles (Schlick), scaled so that the mean over all directions stays S. What is not
-mirrored goes on to the diffuse part, so no light is lost or made:
+one reflects grows towards grazing angles, scaled so that the mean over all directions stays S. What is not mirrored
+goes on to the diffuse part, so no light is lost or made:
 
-    F = S · (f + (1 − f)(1 − cos θ)⁵) / (f + (1 − f)·g)            θ: between view and facet, f: reflectance at θ = 0
+    F = S · (f + (1 − f)·s(θ)) / (f + (1 − f)·g)                   θ: between view and facet, f: reflectance at θ = 0
     D' = D · (1 − F) / (1 − S)
+
+where g is the mean of s. For metals s is (1 − cos θ)⁵ (Schlick), for dielectrics what Fresnel's formula makes of it
+with an index of 1.5: at 60° Schlick's facets mirror a fifth less than plastic does. Dielectric is what reflects less
+than DIELECTRIC of what it meets face on.
 
 Directions are drawn from the facets that the view sees (Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical
 Caps", HPG 2023) and kept with the chance that the way out is open, G₂/G₁ (Heitz, "Understanding the Masking-Shadowing
@@ -39,6 +43,7 @@ LOOKS_A_RAY = 8  # share the rays of one of them
 PATCH_BLUR = 0.2  # least width α of lobes in which patches see lamps
 # And probes: against how far facets that mirror one way turn from one side of a texel to the other, radians.
 TEXEL_BLUR = 0.4
+DIELECTRIC = 0.2  # of light: what facets of dielectrics reflect at most that are seen face on
 ATTEMPTS = 4  # to find a facet whose way out is open
 REFLECTION_STREAM = 0x4CF5AD43
 LIGHT_STREAM = 0x27D4EB2F
@@ -99,8 +104,10 @@ class GlossyPlaces:
     def mirrored(self, cosine: np.ndarray) -> np.ndarray:
         """(N, 3) what facets reflect that are seen at ``cosine`` (N,)."""
         facing = self.rows[:, 1, :3]
-        grazing = np.clip(1 - cosine, 0, 1)[:, None] ** 5
-        shape = (facing + (1 - facing) * grazing) / (facing + (1 - facing) * mean_grazing(self.alpha)[:, None])
+        dielectric = facing.max(axis=1) < DIELECTRIC
+        grazing = np.where(dielectric, dielectric_growth(cosine), np.clip(1 - cosine, 0, 1) ** 5)[:, None]
+        mean = mean_growth(self.alpha, dielectric)[:, None]
+        shape = (facing + (1 - facing) * grazing) / (facing + (1 - facing) * mean)
         return np.minimum(self._whole() * shape, 1.0)
 
     def _whole(self) -> np.ndarray:
@@ -192,10 +199,21 @@ def single_albedo(alpha: np.ndarray) -> np.ndarray:
     return 1 - 0.62 * alpha**1.2
 
 
-def mean_grazing(alpha: np.ndarray) -> np.ndarray:
-    """(N,) mean of (1 − cos θ)⁵ over facets seen from everywhere: 1/21 where they lie flat, less where they turn to the
-    view. A fit to what ``GlossyPlaces.reflect`` draws, good to a tenth."""
-    return 1 / (21 + 204 * alpha**1.55)
+def dielectric_growth(cosine: np.ndarray) -> np.ndarray:
+    """(N,) s of dielectrics at ``cosine`` (N,): what facets of index 1.5 reflect of unpolarised light (Fresnel), from 0
+    for those seen face on to 1 at grazing views."""
+    cosine = np.clip(cosine, 0, 1)
+    bent = np.sqrt(1.25 + cosine * cosine)
+    across, along = (bent - cosine) / (bent + cosine), cosine * (bent + cosine)
+    turned = (along - 1) / (cosine * (bent - cosine) + 1)
+    return np.maximum((across * across * (1 + turned * turned) / 2 - 0.04) / 0.96, 0.0)
+
+
+def mean_growth(alpha: np.ndarray, dielectric: np.ndarray) -> np.ndarray:
+    """(N,) mean of s over facets seen from everywhere, of those that are ``dielectric`` (N,) bool: where they lie flat
+    1/18.5, and 1/21 of metals; less where they turn to the view. Fits to what ``GlossyPlaces.reflect`` draws, good to
+    a tenth."""
+    return 1 / np.where(dielectric, 18.5 + 89.7 * alpha**1.22, 21 + 204 * alpha**1.55)
 
 
 def blurred(alpha: np.ndarray, blur: np.ndarray) -> np.ndarray:

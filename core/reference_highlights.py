@@ -18,7 +18,16 @@ from .conventions import LUMINANCE
 from .cubemap import texel_directions
 from .faint_gloss import albedo_towards, coupled, couplings, faint_rows
 from .gloss import PATCH_BLUR, GlossyPlaces, blurred
-from .highlights import EMITTER_LOOKS, HIGHLIGHT_BLUR, HIGHLIGHT_STREAM, LAMP_LOOKS, LEAST_SEEN, highlights
+from .highlights import (
+    EMITTER_LOOKS,
+    HIGHLIGHT_BLUR,
+    HIGHLIGHT_STREAM,
+    LAMP_LOOKS,
+    LEAST_SEEN,
+    MOST_LOOKS,
+    highlights,
+    sharp,
+)
 from .patches import EMITTERS, NO_PATCH, Part
 from .reference_emitters import ReferenceEmitters
 from .reference_lamps import ReferenceLamps
@@ -55,6 +64,38 @@ class _Places:
     rows: np.ndarray  # (N, 3, 4) of faint_rows
     albedo: np.ndarray  # (N, 3) mean
     role: np.ndarray  # (N,) in light linking
+    width: np.ndarray  # (N,) α of lobes
+    turn: np.ndarray  # (N,) radians, see ``highlights.sharp``
+
+    def at(self, chosen: np.ndarray) -> _Places:
+        return _Places(*(value[chosen] for value in vars(self).values()))
+
+
+@dataclass
+class _Looks:
+    """Sum of highlights by weight, sum of weights, and whether one of them was sharp, at N places."""
+
+    total: np.ndarray  # (N, 3)
+    weights: np.ndarray  # (N,)
+    sharp: np.ndarray  # (N,) bool
+
+    @classmethod
+    def none(cls, count: int) -> _Looks:
+        return cls(np.zeros((count, 3)), np.zeros(count), np.zeros(count, bool))
+
+    def add(self, places: _Places, towards: np.ndarray, irradiance: np.ndarray) -> None:
+        """One more look at each of ``places``, to where so much ``irradiance`` (N, 3) comes from."""
+        weight = np.abs(irradiance) @ LUMINANCE
+        how = places.normal, places.view, towards, places.width
+        self.total += weight[:, None] * highlights(places.rows, places.albedo, *how)
+        self.weights += weight
+        self.sharp |= (weight > 0) & sharp(*how, places.turn)
+
+    def mean(self, whole: np.ndarray) -> np.ndarray:
+        """(N, 3) mean highlight: looks that see much less of the light than the patch as a whole, ``whole`` (N,), show
+        less of it."""
+        weights = np.maximum(self.weights, LEAST_SEEN * whole)
+        return self.total / np.where(weights > 0, weights, 1.0)[:, None]
 
 
 class ReferenceHighlights:
@@ -90,20 +131,32 @@ class ReferenceHighlights:
         through = self.scene.sheet_shares[self.scene.sheet[triangle]].any(axis=1)
         some = np.flatnonzero((triangle >= 0) & (patch >= 0) & faint & ~through)
         middle, rows, mean = self._middle(surfaces, positions, some, face)
-        width = blurred(rows[:, 2, 3], HIGHLIGHT_BLUR * middle.turn())
+        turn = middle.turn()
+        role = self.scene.role[triangle[some]]
+        places = _Places(
+            *(middle.ways.position, middle.places.normal, middle.places.view),
+            *(rows, mean, role, blurred(rows[:, 2, 3], HIGHLIGHT_BLUR * turn), turn),
+        )
         keys = keys_of(nodes[some // texels], HIGHLIGHT_STREAM, seed)
         seen = -np.einsum("ni,ni->n", middle.ways.direction, middle.ways.surface.normal)
         left = middle.ways.surface.albedo / np.maximum(albedo_towards(rows, mean, seen), 1e-9)
         for part, (irradiance, unshadowed) in parts.items():
-            looks = EMITTER_LOOKS if part == EMITTERS else LAMP_LOOKS
-            total, weights = np.zeros((len(some), 3)), np.zeros(len(some))
-            for look in range(looks):
-                numbers = (some % texels) * looks + look
-                way = middle.through(sample_r3(shifted(keys, 0, 1, 0), numbers))
-                role = self.scene.role[triangle[some]]
-                places = _Places(way.position, way.surface.normal, -way.direction, rows, mean, role)
-                _add(total, weights, self._look(part, places, width, keys, numbers))
-            result[some] += irradiance[patch[some]] * left * _mean(total, weights, looks * unshadowed[patch[some]])
+            found = _Looks.none(len(some))
+            least = EMITTER_LOOKS if part == EMITTERS else LAMP_LOOKS
+            looking, looks = np.arange(len(some)), np.full(len(some), least)
+            for look in range(MOST_LOOKS):
+                if look == least:
+                    looking = np.flatnonzero(found.sharp)
+                    looks[looking] = MOST_LOOKS
+                numbers = (some[looking] % texels) * MOST_LOOKS + look
+                way = middle.at(looking).through(sample_r3(shifted(keys[looking], 0, 1, 0), numbers))
+                at = places.at(looking)
+                at.position, at.normal, at.view = way.position, way.surface.normal, -way.direction
+                one = self._look(part, at, keys[looking], numbers)
+                found.total[looking] += one.total
+                found.weights[looking] += one.weights
+                found.sharp[looking] |= one.sharp
+            result[some] += irradiance[patch[some]] * left * found.mean(looks * unshadowed[patch[some]])
         return result.reshape(probes, texels, 3)
 
     def _middle(self, surfaces: Surfaces, positions: np.ndarray, some: np.ndarray, face: int):
@@ -141,23 +194,21 @@ class ReferenceHighlights:
         position, facing = split(points[end, ray % points.shape[1]])
         rows = self._rows[material[end]]
         cosine = -np.einsum("ni,ni->n", direction, facing)
-        places = _Places(position, facing, -direction, rows, albedo[end], self.scene.sheet_roles[sheets[end]])
-        width = np.maximum(rows[:, 2, 3], PATCH_BLUR)
+        width, role = np.maximum(rows[:, 2, 3], PATCH_BLUR), self.scene.sheet_roles[sheets[end]]
+        places = _Places(position, facing, -direction, rows, albedo[end], role, width, 0 * width)
         back = rays.reflected.reshape(-1, 3)[ray] / np.maximum(albedo_towards(rows, albedo[end], cosine), 1e-9)
         back[cosine <= 0] = 0.0
         result = np.zeros((count * each, 3))
         for part, (irradiance, unshadowed) in parts.items():
-            look = self._look(part, places, width, shifted(keys, 0, HIGHLIGHT_STREAM, 0), number)
-            result[ray] += back * irradiance[end] * np.pi * _mean(*look, unshadowed[end])
+            look = self._look(part, places, shifted(keys, 0, HIGHLIGHT_STREAM, 0), number)
+            result[ray] += back * irradiance[end] * np.pi * look.mean(unshadowed[end])
         counted = np.maximum((ends != NO_PATCH).sum(axis=1), 1)
         return result.reshape(count, each, 3).sum(axis=1) / counted[:, None]
 
-    def _look(
-        self, part: Part, places: _Places, width: np.ndarray, keys: np.ndarray, index: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Sum of highlights (N, 3) by weight and sum of weights (N,), of one look at ``part`` of the light."""
+    def _look(self, part: Part, places: _Places, keys: np.ndarray, index: np.ndarray) -> _Looks:
+        """One look at ``part`` of the light."""
         coupling = couplings(places.rows, places.albedo)
-        total, weights = np.zeros_like(places.position), np.zeros(len(places.position))
+        found = _Looks.none(len(places.position))
         if part == EMITTERS:
             emitter = self._emitters.sample(sample_r3(keys, index).astype(float), places.position)
             offset = emitter.point - places.position
@@ -166,32 +217,13 @@ class ReferenceHighlights:
             cosine = np.maximum(np.einsum("ni,ni->n", towards, places.normal), 0.0)
             factor = cosine * np.abs(np.einsum("ni,ni->n", towards, emitter.normal)) / (squared * emitter.density)
             factor = np.where(self.scene.falls_on(emitter.group, places.role), factor, 0.0)
-            irradiance = emitter.radiance * factor[:, None] * coupled(coupling, cosine)
-            _add(total, weights, _highlight(places, towards, irradiance, width))
-            return total, weights
+            found.add(places, towards, emitter.radiance * factor[:, None] * coupled(coupling, cosine))
+            return found
         u = sample_r2(keys, index).astype(float)
         for lamp in self._lamps.all()[slice(*part)]:
             sample = direct_light.sample_light(lamp, places.position + self.scene.origin, u)
             irradiance = direct_light.unshadowed_irradiance(sample, places.normal)
             irradiance *= self.scene.falls_on(lamp.link_group, places.role)[:, None]
             irradiance *= coupled(coupling, np.einsum("ni,ni->n", sample.directions, places.normal))
-            _add(total, weights, _highlight(places, sample.directions, irradiance, width))
-        return total, weights
-
-
-def _highlight(places: _Places, towards: np.ndarray, irradiance: np.ndarray, width: np.ndarray):
-    weight = np.abs(irradiance) @ LUMINANCE
-    found = highlights(places.rows, places.albedo, places.normal, places.view, towards, width)
-    return weight[:, None] * found, weight
-
-
-def _mean(total: np.ndarray, weights: np.ndarray, whole: np.ndarray) -> np.ndarray:
-    """(N, 3) mean highlight of looks: those that see much less of the light than the patch as a whole, ``whole`` (N,),
-    show less of it."""
-    weights = np.maximum(weights, LEAST_SEEN * whole)
-    return total / np.where(weights > 0, weights, 1.0)[:, None]
-
-
-def _add(total: np.ndarray, weights: np.ndarray, look: tuple[np.ndarray, np.ndarray]) -> None:
-    total += look[0]
-    weights += look[1]
+            found.add(places, sample.directions, irradiance)
+        return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from ..core.gloss import (
     ATTEMPTS,
+    DIELECTRIC,
     LEAST_LOOKS,
     LIGHT_STREAM,
     LOOKS_A_RAY,
@@ -16,7 +17,16 @@ from ..core.gloss import (
     TEXEL_LOOKS,
     TEXEL_RAYS,
 )
-from ..core.highlights import EMITTER_LOOKS, HIGHLIGHT_BLUR, HIGHLIGHT_STREAM, LAMP_LOOKS, LEAST_SEEN
+from ..core.highlights import (
+    EMITTER_LOOKS,
+    HIGHLIGHT_BLUR,
+    HIGHLIGHT_STREAM,
+    LAMP_LOOKS,
+    LEAST_SEEN,
+    MOST_LOOKS,
+    NEAR_PEAK,
+    SHARP,
+)
 from ..core.patches import POINTS
 from .create_infos import (
     _PROBE_FILES,
@@ -35,6 +45,7 @@ from .patch_create_infos import _compaction
 
 _NUMBERS = {
     "ATTEMPTS": ATTEMPTS,
+    "DIELECTRIC": DIELECTRIC,
     "MOST_REFLECTIONS": MOST_REFLECTIONS,
     "REFLECTION_STREAM": f"{REFLECTION_STREAM}u",
     "LIGHT_STREAM": f"{LIGHT_STREAM}u",
@@ -142,7 +153,8 @@ def highlight_numbers(info, defines: dict) -> None:
 def _highlights(info, defines: dict) -> int:
     """What highlight_lib reads, the irradiance of the part of the light that is meant among it."""
     highlight_numbers(info, {})
-    info.define("LEAST_SEEN", str(LEAST_SEEN))
+    for name, value in ("LEAST_SEEN", LEAST_SEEN), ("SHARP", SHARP), ("NEAR_PEAK", NEAR_PEAK):
+        info.define(name, str(value))
     _ints(info, *(() if "HAS_EMITTERS" in defines else ("first_light", "last_light")), "light_count", "seed")
     slot = _emitters(info, defines, _scene(info, defines))
     return _samplers(info, "lights", "part_irradiance", "part_spread", first=slot)
@@ -155,6 +167,7 @@ def _highlight_files(defines: dict) -> list[str]:
 def highlight_project_comp(info, defines):
     info.define("NO_SURFACE", NO_SURFACE)
     info.define("LOOKS", str(EMITTER_LOOKS if "HAS_EMITTERS" in defines else LAMP_LOOKS))
+    info.define("MOST_LOOKS", str(MOST_LOOKS))
     slot = _samplers(info, "probe_slots", "probe_layers", "texel_weights", first=_highlights(info, defines))
     _samplers(info, "geometry", "albedo", kind="FLOAT_2D_ARRAY", first=_sheets(info, defines, slot))
     _image(info, 0, "field", access="READ+WRITE")

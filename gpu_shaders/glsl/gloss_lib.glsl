@@ -47,11 +47,27 @@ uvec3 reflection_event(uvec3 key, int number, int depth)
   return pcg3d(key + uvec3(uint(number), REFLECTION_STREAM + uint(depth), 0u));
 }
 
-vec3 mirrored_by_facet(Gloss gloss, vec3 albedo, float cosine)
+/* Growth of what facets of index 1.5 reflect (Fresnel), 0 for those seen face on. */
+float dielectric_growth(float cosine)
+{
+  cosine = clamp(cosine, 0.0, 1.0);
+  float bent = sqrt(1.25 + cosine * cosine);
+  float across = (bent - cosine) / (bent + cosine);
+  float turned = (cosine * (bent + cosine) - 1.0) / (cosine * (bent - cosine) + 1.0);
+  return max((0.5 * across * across * (1.0 + turned * turned) - 0.04) / 0.96, 0.0);
+}
+
+float schlick_growth(float cosine)
 {
   float grazing = clamp(1.0 - cosine, 0.0, 1.0);
-  grazing *= grazing * grazing * grazing * grazing;
-  float seldom = 1.0 / (21.0 + 204.0 * pow(gloss.alpha, 1.55));
+  return grazing * grazing * grazing * grazing * grazing;
+}
+
+vec3 mirrored_by_facet(Gloss gloss, vec3 albedo, float cosine)
+{
+  bool is_dielectric = max(max(gloss.facing.r, gloss.facing.g), gloss.facing.b) < DIELECTRIC;
+  float grazing = is_dielectric ? dielectric_growth(cosine) : schlick_growth(cosine);
+  float seldom = 1.0 / (is_dielectric ? 18.5 + 89.7 * pow(gloss.alpha, 1.22) : 21.0 + 204.0 * pow(gloss.alpha, 1.55));
   vec3 shape = (gloss.facing + (1.0 - gloss.facing) * grazing) / (gloss.facing + (1.0 - gloss.facing) * seldom);
   return min(mirrored_in_all(gloss, albedo) * shape, vec3(1.0));
 }

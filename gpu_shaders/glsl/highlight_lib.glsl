@@ -39,9 +39,11 @@ vec3 highlight(FaintGloss faint, Surface surface, vec3 view, vec3 towards, float
     return vec3(0.0);
   }
   surface.albedo = surface.mean_albedo;
-  vec3 whole = mirrored_in_all(faint.gloss, surface.albedo);
-  vec3 evenly = faintly_mirrored(faint, whole, dot(view, surface.normal)) * faintly_mirrored(faint, whole, arriving) /
-                (3.141592653589793 * max(whole, vec3(1.0e-9)));
+  float leaving = dot(view, surface.normal);
+  vec3 mirrored = faintly_mirrored(faint, mirrored_in_all(faint.gloss, surface.albedo), leaving);
+  vec3 evenly = albedo_at(faint, surface.albedo, leaving);
   coupling = surface.coupling;
-  return (gloss_lobe(faint.gloss, surface, view, towards, width) / arriving - evenly) / coupled(arriving);
+  vec3 counts = coupled(arriving);
+  vec3 replaced = evenly * counts - (evenly - mirrored);
+  return (gloss_lobe(faint.gloss, surface, view, towards, width) / arriving - replaced * 0.3183098861837907) / counts;
 }

@@ -6,7 +6,18 @@ const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
 struct Look {
   vec3 sum; /* of highlights by weight */
   float weight;
+  float turn; /* of facets that mirror one way, seen face on, from one side of what is looked at to the other */
+  bool is_sharp; /* a lobe was met that is narrow against that */
 };
+
+/* May the highlight at hand change much within what is looked at? */
+bool is_sharp(vec3 normal, vec3 view, vec3 towards, float width, float turn)
+{
+  vec3 middle = normalize(view + towards);
+  float height = max(dot(middle, normal), 1.0e-4);
+  float turns = turn / max(dot(view, middle), 1.0e-3); /* a view at a slant turns them by more */
+  return turns > SHARP * width && sqrt(max(1.0 - height * height, 0.0)) < NEAR_PEAK * (width + turns) * height;
+}
 
 void add_look(inout Look look, FaintGloss faint, Surface surface, vec3 view, vec3 towards, vec3 irradiance, float width)
 {
@@ -14,6 +25,7 @@ void add_look(inout Look look, FaintGloss faint, Surface surface, vec3 view, vec
   if (weight > 0.0) {
     look.sum += weight * highlight(faint, surface, view, towards, width);
     look.weight += weight;
+    look.is_sharp = look.is_sharp || is_sharp(surface.normal, view, towards, width, look.turn);
   }
 }
 

@@ -4,8 +4,8 @@
  * core/highlights.py.
  *
  * With HAS_EMITTERS the part is that of sampled emitters, else that of the lamps first_light .. last_light. LOOKS looks
- * a texel, from places all over it at places all over the lamps, each weighted by what arrives if nothing stands
- * between.
+ * a texel, MOST_LOOKS where a lobe is narrow, from places all over it at places all over the lamps, each weighted by
+ * what arrives if nothing stands between.
  * part_irradiance: of that part alone, an element a patch; part_spread: see patch_spread_comp
  * probe_layers, 1 element a probe of the dispatch: its layer; its slot is that much after first_slot
  * Dispatch: one group of GROUP threads a probe. Threads take texels in strides.
@@ -41,15 +41,16 @@ vec3 highlights_of_texel(ivec3 at, vec4 slot)
   float turn = is_flat ? 0.7853981633974483 / float(FACE) : turn_over(middle, slot.xyz, at.xy);
   float width = blurred(faint.gloss.alpha, HIGHLIGHT_BLUR * turn);
   uvec3 key = uvec3(uint(slot.w), HIGHLIGHT_STREAM, uint(seed));
-  Look look = Look(vec3(0.0), 0.0);
-  for (int i = 0; i < LOOKS; i++) {
-    int number = (at.y * FACE + at.x) * LOOKS + i;
+  Look look = Look(vec3(0.0), 0.0, turn, false);
+  int looks = 0;
+  for (; looks < LOOKS || (look.is_sharp && looks < MOST_LOOKS); looks++) {
+    int number = (at.y * FACE + at.x) * MOST_LOOKS + looks;
     Way way = way_through(sample_r3(key + uvec3(0u, 1u, 0u), number).xy, middle, slot.xyz, at.xy);
     look_at_part(look, faint, way.surface, -way.direction, width, key, number);
   }
   /* what holes before the surface leave is in the texel's albedo alone */
   vec3 left = reflects.rgb / max(middle.surface.albedo, vec3(1.0e-9));
-  return irradiance * left * mean_look(look, LOOKS, element(part_spread, int(reflects.w)).x);
+  return irradiance * left * mean_look(look, looks, element(part_spread, int(reflects.w)).x);
 }
 
 void main()

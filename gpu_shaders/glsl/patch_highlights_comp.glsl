@@ -26,7 +26,7 @@ vec3 sent_beyond(int ray, int end, vec3 irradiance, vec4 met, vec4 made_of, vec3
   lit_role = role_of_sheet(int(element(sheet_numbers, end).x));
 #endif
   FaintGloss faint = faint_gloss_of(int(made_of.w));
-  Look look = Look(vec3(0.0), 0.0);
+  Look look = Look(vec3(0.0), 0.0, 0.0, false);
   uvec3 light_key = key + uvec3(0u, HIGHLIGHT_STREAM, 0u);
   look_at_part(look, faint, surface, -direction, max(faint.gloss.alpha, PATCH_BLUR), light_key, number);
   vec3 evenly = max(albedo_at(faint, surface.mean_albedo, leaving), vec3(1.0e-9));

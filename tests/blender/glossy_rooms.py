@@ -157,6 +157,21 @@ def coloured_plastic(scene):
     scenes.add_light(scene, "POINT", (0.9, 1.0, 2.0), energy=80.0, shadow_soft_size=0.1)
 
 
+def sunny_floor(scene, roughness):
+    """Nothing but a floor of brown plastic in a low sun, which is seen in it by all probes."""
+    brown = principled("Brown", Base_Color=(0.5, 0.33, 0.19), Roughness=roughness)
+    scenes.add_box(scene, "Floor", (-20, -20, -0.2), (20, 20, 0), brown)
+    sun = scenes.add_light(scene, "SUN", (0, 0, 5), energy=4.0, angle=0.0092)
+    sun.rotation_euler = (np.radians(58), 0, np.radians(8))
+
+
+def lamp_along_a_wall(scene, roughness):
+    """Red plastic that a lamp and all probes see at grazing angles."""
+    red = principled("Red", Base_Color=(0.6, 0.05, 0.03), Roughness=roughness)
+    scenes.add_box(scene, "Wall", (3, -1, 0), (3.2, 6, 3), red)
+    scenes.add_light(scene, "POINT", (2.5, 5.0, 2.4), energy=150.0, shadow_soft_size=0.1)
+
+
 ROOMS = {
     "bathroom": (bathroom,),
     "metal 0.1": (metal_walls, 0.1),
@@ -173,6 +188,10 @@ ROOMS = {
     "all of grey plastic": (all_of_plastic, 0.3),
     "grey plastic in the sun": (plastic_in_the_sun, 0.2),
     "coloured plastic": (coloured_plastic,),
+    "plastic floor in the sun, 0.35": (sunny_floor, 0.35),
+    "plastic floor in the sun, 0.5": (sunny_floor, 0.5),
+    "lamp along a plastic wall, 0.3": (lamp_along_a_wall, 0.3),
+    "lamp along a plastic wall, 0.5": (lamp_along_a_wall, 0.5),
 }
 
 

@@ -74,7 +74,7 @@ def test_gloss_against_cycles(gpu_context, name):
     assert gloss.relative_rms < 1.02 * diffuse.relative_rms
 
 
-@pytest.mark.parametrize("name", ["coated wood", "all of grey plastic"])
+@pytest.mark.parametrize("name", ["coated wood", "all of grey plastic", "plastic floor in the sun, 0.35"])
 def test_gloss_helps(gpu_context, name):
     """Followed, or sent by angles with highlights: two of these rooms, quickly."""
     gloss, diffuse, noise, floor = measured(name, 3, 8)

@@ -45,6 +45,20 @@ def test_a_mirror_mirrors():
     np.testing.assert_allclose(drawn.direction, np.tile([-0.6, 0, 0.8], (8, 1)), atol=1e-12)
 
 
+def test_facets_of_dielectrics_reflect_by_fresnel():
+    """By Snell's law for both polarisations, and nothing of that face on, all of it along the surface."""
+    angle = np.radians([0.0, 20, 45, 56.31, 70, 80, 89.999])
+    cosine, bent = np.cos(angle), np.sqrt(1 - (np.sin(angle) / 1.5) ** 2)
+    across = (cosine - 1.5 * bent) / (cosine + 1.5 * bent)
+    along = (1.5 * cosine - bent) / (1.5 * cosine + bent)
+    reflected = 0.04 + 0.96 * gloss.dielectric_growth(cosine)
+    np.testing.assert_allclose(reflected, (across**2 + along**2) / 2, atol=1e-12)
+    plastic = places(UP, 0.0, len(angle), share=0.09, facing=0.04).mirrored(cosine)[:, 0]
+    np.testing.assert_allclose(plastic / plastic[0], reflected / 0.04, rtol=1e-6)
+    metal = places(UP, 0.0, len(angle), share=0.5, facing=0.5).mirrored(cosine)[:, 0]
+    np.testing.assert_allclose(metal / metal[0], 1 + (1 - cosine) ** 5, rtol=1e-6)
+
+
 @pytest.mark.parametrize(("facing", "share"), [(0.04, 0.09), (0.5, 0.8), (1.0, 0.3)])
 @pytest.mark.parametrize("roughness", [0.0, 0.3, 0.6])
 def test_what_is_mirrored_is_the_share_over_all_directions(roughness, facing, share):

@@ -3,9 +3,9 @@
 
 import numpy as np
 import pytest
-from gridlight.core.faint_gloss import coupled, couplings, faint_rows, mirrored_at
+from gridlight.core.faint_gloss import albedo_towards, coupled, couplings, faint_rows, mirrored_at
 from gridlight.core.gloss import Gloss
-from gridlight.core.highlights import highlights
+from gridlight.core.highlights import MOST_LOOKS, highlights, sharp
 
 pytestmark = pytest.mark.any_version
 PLASTIC = Gloss((0.056, 0.056, 0.056), (0.04, 0.04, 0.04), 0.5, fixed=True)
@@ -57,3 +57,33 @@ def test_it_is_brightest_where_a_mirror_would_send_it():
 def test_light_from_below_makes_none():
     towards = at(0.5) * [1, 1, -1]
     assert not beyond(PLASTIC, 0.3, hemisphere(), towards)[0].any()
+
+
+@pytest.mark.parametrize("cosine", [1.0, 0.5, 0.1])
+def test_beside_the_lobe_is_what_facets_leave_to_the_diffuse_part(cosine):
+    """With facets so flat that their lobe is hardly anywhere: (A − S)(1 − F)/(1 − S)/π of all light, from wherever."""
+    gloss, albedo, views = Gloss((0.09, 0.09, 0.09), (0.04, 0.04, 0.04), 0.05, fixed=True), 0.3, hemisphere()
+    found, _ = beyond(gloss, albedo, views, at(cosine))
+    rows = np.repeat(faint_rows([gloss]).astype(float), COUNT, axis=0)
+    plain = np.full((COUNT, 3), albedo)
+    even = albedo_towards(rows, plain, views[:, 2]) * coupled(couplings(rows, plain), at(cosine)[:, 2]) / np.pi
+    mirrored = mirrored_at(rows, plain, views[:, 2])
+    away = views @ [-np.sqrt(1 - cosine**2), 0.0, cosine] < 0.7
+    expected = (albedo - 0.09) * (1 - mirrored) / (1 - 0.09) / np.pi
+    np.testing.assert_allclose((even + found)[away], expected[away], atol=1e-3)
+
+
+def test_it_is_sharp_where_it_is_narrower_than_what_is_looked_at():
+    """Plastic of roughness 0.3 seen from 10 to 5 cm above it: α is 0.09, and at 80° facets turn by 0.05 / cos 80°."""
+    up, width, turn = np.array([[0.0, 0.0, 1.0]]), np.array([0.09]), np.array([0.05])
+
+    def is_sharp(view_degrees, light_degrees, turn):
+        view, light = np.radians(view_degrees), np.radians(light_degrees)
+        towards = np.array([[-np.sin(light), 0.0, np.cos(light)]])
+        return bool(sharp(up, np.array([[np.sin(view), 0.0, np.cos(view)]]), towards, width, turn)[0])
+
+    assert is_sharp(80, 80, turn) and is_sharp(75, 80, turn)
+    assert not is_sharp(80, 80, 0.1 * turn), "small texels"
+    assert not is_sharp(0, 80, turn), "far from the peak"
+    assert is_sharp(20, 20, turn) and not is_sharp(20, 20, 0.5 * turn)
+    assert MOST_LOOKS > 8
