@@ -9,6 +9,9 @@ plane that goes on. Of walls that enclose the probe the nearest of these planes 
 and nowhere nearer than the blend; of a thing that stands before another the plane goes on past its end, nearer than the
 blend, and there the blend counts. So the farther of the two is taken. Where they agree, the probe sees what it knows to
 be flat, and nothing is left of the spread that distances to a slanted wall have within a texel.
+
+Where a wall ends within a texel, neither says on which side of the end a place lies. But a place that lies on one of
+the planes and looks away from the probe is on the back of what that texel shows, and the probe cannot see it.
 GLSL twin: lookup_lib.glsl, which is given ``sights``.
 """
 
@@ -26,6 +29,11 @@ DEPTH_VALUES = 4  # of a texel, see Field.depth
 LEAST_DISTANCE = 1e-6  # of the depth clamp: what a surface at no distance counts as
 LEAST_COSINE = 0.05  # between a texel's direction and its plane's normal: what is seen more edge-on counts as facing
 NOT_FLAT = 5.0  # over this: how much nearer planes are than the blend where all of the spread counts
+# Of the distance to a plane: what is as near to it lies on it, twice as far it does not. And the cosine from which on a
+# normal is that of the plane's back.
+ON_PLANE = 0.02
+LIKE_BACK = 0.9
+FARTHEST_PLANE = 1.1  # inverse distance, in those of the depth clamp: what is as far may be the background
 
 
 class Sight(NamedTuple):
@@ -70,16 +78,22 @@ def inverse_moments(depth: np.ndarray) -> np.ndarray:
 
 
 def sample_inverse(
-    depth: np.ndarray, clamp: float, nodes: np.ndarray, directions: np.ndarray, most: np.ndarray
+    depth: np.ndarray,
+    clamp: float,
+    nodes: np.ndarray,
+    directions: np.ndarray,
+    most: np.ndarray,
+    place: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
-    """(…, 2) inverse distance along ``directions`` (…, 3), in those of ``clamp`` metres, and its variance, by the
+    """(…, 3) inverse distance along ``directions`` (…, 3), in those of ``clamp`` metres, its variance, and how much the
+    ``place``, metres from the probe (…, 3) and its normal (…, 3), is on the back of what is seen (0..1), by the
     ``depth`` (P, DEPTH_EDGE², DEPTH_VALUES) of ``nodes`` (…); of four texels, none of which counts as closer than
     ``most`` (…)."""
     position, scale = _blended_place(directions)
     corner = np.floor(position).astype(int)
     all_texels = np.arange(DEPTH_EDGE**2)
     ahead = sight(depth, clamp, all_texels) if len(depth) * len(all_texels) < 4 * nodes.size else None
-    blended, spread, nearest = (np.zeros(nodes.shape) for _ in range(3))
+    blended, spread, nearest, behind = (np.zeros(nodes.shape) for _ in range(4))
     for step, weight in _texel_weights(position - corner, corner).items():
         texel = _wrap_octahedral(corner + step)
         number = texel[..., 1] * DEPTH_EDGE + texel[..., 0]
@@ -92,8 +106,18 @@ def sample_inverse(
         spread += weight * found.variance * (inverse / found.mean) ** 2
         further = np.minimum((found.planes * directions).sum(axis=-1), most)
         nearest = np.maximum(nearest, np.where(found.known, further, most))
+        behind = np.maximum(behind, np.where(found.known, _on_back(found.planes, clamp, *place), 0.0))
     uneven = np.clip(NOT_FLAT * (nearest / blended - 1.0), 0.0, 1.0)
-    return np.stack([np.minimum(blended, nearest), uneven * spread], axis=-1)
+    return np.stack([np.minimum(blended, nearest), uneven * spread, behind], axis=-1)
+
+
+def _on_back(planes: np.ndarray, clamp: float, offset: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """(…) how much a place ``offset`` (…, 3) metres from the probe lies on ``planes`` (…, 3) and its ``normal`` (…, 3)
+    points where their backs do."""
+    length = np.sqrt(np.einsum("...i,...i", planes, planes))
+    away = np.einsum("...i,...i", planes, normal) > LIKE_BACK * length
+    apart = np.abs(np.einsum("...i,...i", planes, offset) / clamp - 1.0)
+    return np.where(away & (length > FARTHEST_PLANE), np.clip(2.0 - apart / ON_PLANE, 0.0, 1.0), 0.0)
 
 
 def _blended_place(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

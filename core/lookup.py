@@ -39,6 +39,8 @@ BEYOND = 0.5  # cells along each axis, past the box and in all, that gradients l
 # Of the distance to the probe: how far points are moved along their normal before they are tested, so that their own
 # surface does not hide them. As far may places in free space look through a wall that they face.
 OFF_SURFACE = 0.04
+# Left of the chance of a place that is on the back of what the probe sees.
+ON_BACK = 1e-6
 # Times as close as the point: what is closer hides it no more. A probe beside a wall has it in the texels next to those
 # that look along it, a hundred times as close as anything there.
 HIDES = 4.0
@@ -158,20 +160,20 @@ def _place(grid: Grid, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.n
 def visibility(field: Field, nodes: np.ndarray, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """(N, K) chance that each of ``nodes`` (N, K) sees its point of ``points`` (N, 3) on a surface with ``normals`` (N,
     3)."""
-    offset = points[:, None] - (field.grid.positions()[nodes] + field.offset[nodes])
-    offset = offset + OFF_SURFACE * np.linalg.norm(offset, axis=2, keepdims=True) * normals[:, None]
+    place = points[:, None] - (field.grid.positions()[nodes] + field.offset[nodes]), normals[:, None]
+    offset = place[0] + OFF_SURFACE * np.linalg.norm(place[0], axis=2, keepdims=True) * place[1]
     distance = np.linalg.norm(offset, axis=2)
     away = distance > 0
     direction = np.where(away[..., None], offset, [0, 0, 1]) / np.where(away, distance, 1)[..., None]
     clamp = depth_clamp(field.grid)
     inverse_there = np.maximum(clamp / np.where(away, distance, 1), FARTHEST)
-    found = sample_inverse(field.depth, clamp, nodes, direction, HIDES * inverse_there)
-    inverse, variance = np.moveaxis(found, -1, 0)
+    found = sample_inverse(field.depth, clamp, nodes, direction, HIDES * inverse_there, place)
+    inverse, variance, behind = np.moveaxis(found, -1, 0)
     beyond = inverse - inverse_there
     least = least_deviation(field.grid) / clamp * inverse * inverse_there
     variance = np.maximum(variance, least**2)
-    chance = variance / (variance + beyond * beyond)
-    return np.where(away & (beyond > 0), chance**_SHARPNESS, 1.0)
+    chance = np.where(beyond > 0, variance / (variance + beyond * beyond), 1.0)
+    return np.where(away, chance**_SHARPNESS * (1.0 - (1.0 - ON_BACK) * behind), 1.0)
 
 
 def irradiance(field: Field, points: np.ndarray, normals: np.ndarray) -> np.ndarray:

@@ -28,9 +28,11 @@ _LOOKUP_CONSTANTS = (
     "INVALID_WEIGHT",
     "LEAST_WEIGHT",
     "OFF_SURFACE",
+    "ON_BACK",
     "ON_BORDER",
     "SEEN_ENOUGH",
 )
+_DEPTH_MAP_CONSTANTS = "FARTHEST_PLANE", "LIKE_BACK", "NOT_FLAT", "ON_PLANE"
 
 
 def _samplers(info, *names: str, kind: str = "FLOAT_2D", first: int = 0) -> int:
@@ -76,7 +78,8 @@ def _sheet_files(defines: dict) -> list[str]:
 
 def _lookup(info, first: int) -> int:
     info.define("DEPTH_EDGE", str(DEPTH_EDGE))
-    info.define("NOT_FLAT", repr(depth_map.NOT_FLAT))
+    for name in _DEPTH_MAP_CONSTANTS:
+        info.define(name, repr(getattr(depth_map, name)))
     for name in _LOOKUP_CONSTANTS:
         info.define(name, repr(getattr(lookup, name)))
     info.uniform_buf(0, "vec4", "grid_info[5]")

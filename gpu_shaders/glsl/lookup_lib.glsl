@@ -55,8 +55,9 @@ float octahedron_length(ivec2 texel)
 }
 
 /* Inverse distance along `direction`, in those of the depth clamp, and its variance. Blended of four texels so that
- * their directions come to `direction`: planes are linear in it. No nearer than the planes that they see go on. */
-vec2 sample_inverse(int slot, vec3 direction, float most)
+ * their directions come to `direction`: planes are linear in it. No nearer than the planes that they see go on. Then
+ * how much a place, `offset` from the probe in depth clamps, lies on one of them and looks as its back does. */
+vec3 sample_inverse(int slot, vec3 direction, float most, vec3 offset, vec3 normal)
 {
   float norm = dot(abs(direction), vec3(1.0)), halved = 1.0 / float(DEPTH_EDGE);
   vec2 flat_place = abs(direction.xy) / norm;
@@ -70,41 +71,46 @@ vec2 sample_inverse(int slot, vec3 direction, float most)
   ivec2 corner = ivec2(floor(position));
   vec4 weights = texel_weights(position - vec2(corner), 2 * (corner + 1) - DEPTH_EDGE);
   float scale = norm / inside;
-  float blended = 0.0, spread = 0.0, nearest = 0.0;
+  float blended = 0.0, spread = 0.0, nearest = 0.0, behind = 0.0;
   for (int i = 0; i < 4; i++) {
     ivec2 texel = wrap_octahedral(corner + ivec2(i & 1, i >> 1));
     vec4 sight = element(sights, (slot * DEPTH_EDGE + texel.y) * DEPTH_EDGE + texel.x);
     float share = min(scale * octahedron_length(texel), most / abs(sight.z));
     blended += weights[i] * share * abs(sight.z);
     spread += weights[i] * share * share * sight.w;
-    float further = sight.y * dot(unpack_normal(sight.x), direction);
-    nearest = max(nearest, sight.z < 0.0 ? most : min(further, most));
+    vec3 away = unpack_normal(sight.x);
+    nearest = max(nearest, sight.z < 0.0 ? most : min(sight.y * dot(away, direction), most));
+    if (sight.z > 0.0 && sight.y > FARTHEST_PLANE && dot(away, normal) > LIKE_BACK) {
+      float apart = abs(sight.y * dot(away, offset) - 1.0);
+      behind = max(behind, clamp(2.0 - apart / ON_PLANE, 0.0, 1.0));
+    }
   }
   float uneven = clamp(NOT_FLAT * (nearest / blended - 1.0), 0.0, 1.0);
-  return vec2(min(blended, nearest), uneven * spread);
+  return vec3(min(blended, nearest), uneven * spread, behind);
 }
 
 /* How likely the probe in `slot` sees `point` on a surface with `normal`, 0..1. */
 float visibility(int slot, vec3 probe, vec3 point, vec3 normal)
 {
-  vec3 offset = point - probe;
-  offset += OFF_SURFACE * length(offset) * normal;
+  vec3 there = point - probe;
+  vec3 offset = there + OFF_SURFACE * length(there) * normal;
   float squared = dot(offset, offset);
   if (squared == 0.0) {
     return 1.0;
   }
   float distance = sqrt(squared);
   float inverse_there = max(grid_info[3].w / distance, FARTHEST);
-  vec2 inverse = sample_inverse(slot, offset / distance, HIDES * inverse_there);
+  vec3 inverse = sample_inverse(slot, offset / distance, HIDES * inverse_there, there / grid_info[3].w, normal);
+  float front = 1.0 - (1.0 - ON_BACK) * inverse.z;
   float beyond = inverse.x - inverse_there;
   if (beyond <= 0.0) {
-    return 1.0;
+    return front;
   }
   float least = grid_info[4].x / grid_info[3].w * inverse.x * inverse_there;
   float variance = max(inverse.y, least * least);
   float chance = variance / (variance + beyond * beyond);
   float fourth = chance * chance * chance * chance;
-  return fourth * fourth * chance * chance; /* the tenth power */
+  return front * fourth * fourth * chance * chance; /* the tenth power */
 }
 
 /* `point` in node numbers, clamped to the box; `beyond`: cells past it. */

@@ -212,7 +212,8 @@ def test_the_depth_map_has_no_seams():
 def inverse_along(field, directions):
     """(N,) inverse of the distance that probe 0 knows of along ``directions`` (N, 3)."""
     nodes, unlimited, clamp = np.zeros(len(directions), int), np.full(len(directions), np.inf), 1e6
-    return sample_inverse(field.depth, clamp, nodes, directions, unlimited)[:, 0] / clamp
+    anywhere = directions, np.zeros_like(directions)
+    return sample_inverse(field.depth, clamp, nodes, directions, unlimited, anywhere)[:, 0] / clamp
 
 
 @pytest.mark.parametrize("normal", [[1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1], [3, 4, 0], [1, -1, 1], [-2, 5, -4]])
@@ -302,3 +303,27 @@ def test_what_stands_behind_a_wall_of_a_convex_room_is_hidden():
     nodes, plain = lookup.trilinear(field.grid, points)
     behind = lookup.visibility(field, nodes, points - 0.1 * normals, -normals)  # a wall of 10 cm, its other side
     assert (plain * behind).sum(axis=1).mean() < 1e-3
+
+
+@pytest.mark.parametrize("end", [-0.35, -0.1, 0.04, 0.2, 0.4])
+def test_a_single_plane_that_ends_within_a_texel_hides_its_back(end):
+    """All of the back, however near to the end, whatever of it the texel there sees; and nothing of the front."""
+    field = open_field((2, 2, 2), np.diag([0.5, 0.5, 0.5, 1.0]))
+    probe, clamp = field.grid.positions()[0], lookup.depth_clamp(field.grid)
+
+    def distances(directions):
+        onto = 0.4 / np.maximum(directions[..., 0], 1e-6)
+        return np.where((directions[..., 1] * onto < end) & (onto < clamp), onto, clamp)
+
+    distance, middle = distances(sample_directions()), distances(map_directions())
+    normals = np.where((middle < clamp)[:, None], [-1.0, 0, 0], -map_directions())
+    packed = pack_normal(octahedral_encode(normals))
+    field.depth[0] = np.stack([distance.mean(axis=1), (distance**2).mean(axis=1), packed, middle], axis=1)
+    random = np.random.default_rng(9)
+    along = np.column_stack([end - random.uniform(0.002, 0.15, 500), random.uniform(-0.4, 0.4, 500)])
+    nodes, facing = np.zeros((500, 1), int), np.tile([1.0, 0, 0], (500, 1))
+    behind = probe + np.column_stack([np.full(500, 0.402), along])
+    hidden = lookup.visibility(field, nodes, behind, facing) < 1e-5
+    assert hidden.all()
+    before = probe + np.column_stack([np.full(500, 0.398), along])
+    assert lookup.visibility(field, nodes, before, -facing).mean() > 0.95
