@@ -104,8 +104,8 @@ def bake(scene: SceneSnapshot, low, high, resolution, **settings) -> Field:
 
 def straight(field: Field) -> Field:
     """``field`` as engines interpolate it: no gradients, and nothing ever stands between a point and a probe."""
-    plain = Field(field.grid, field.coefficients, field.state, field.validity, field.offset, field.depth.copy())
-    plain.depth[:] = 1e3, 1e6
+    plain = Field(field.grid, field.coefficients, field.state, field.validity, field.offset, np.zeros_like(field.depth))
+    plain.depth[..., :2] = 1e3, 1e6  # far and flat, and nothing of planes
     return plain
 
 
