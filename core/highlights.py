@@ -25,10 +25,10 @@ from .faint_gloss import albedo_towards, coupled, couplings, mirrored_at
 from .gloss import GlossyPlaces
 
 LAMP_LOOKS, EMITTER_LOOKS = 2, 4  # of a texel, at each part of the light, but
-MOST_LOOKS = 32  # where one of them finds a lobe that is narrow against the texel
+MOST_LOOKS = 16  # where one of them finds a lobe that is narrow against the texel
 # Narrow is a lobe of which SHARP widths are less than its facets turn within the texel; it counts up to NEAR_PEAK times
 # both of them away from its peak. At grazing angles most highlights are narrower than texels.
-SHARP, NEAR_PEAK = 0.5, 4.0
+SHARP, NEAR_PEAK = 0.5, 3.0
 # Least width of lobes, against how far facets that mirror one way turn from one side of a texel to the other: probes
 # see all texels together, so a lobe may be as wide as one.
 HIGHLIGHT_BLUR = 1.0
