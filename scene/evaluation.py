@@ -50,7 +50,7 @@ def at_render_quality(
     view_layer.update()  # what scripts changed reaches the user's own objects, whose places volumes and cameras have
     bpy.utils.register_class(engine)
     try:
-        with scene_copy(scene) as copy, quiet_stdout(), nothing_to_update():
+        with scene_copy(scene) as copy, quiet_stdout(), nothing_to_update(copy):
             copy.render.engine = engine.bl_idname
             copy.render.resolution_x = copy.render.resolution_y = 4
             bpy.ops.render.render(scene=copy.name, layer=view_layer.name)

@@ -125,7 +125,7 @@ def render_pixels(scene: bpy.types.Scene, view_layer: str) -> np.ndarray:
     with tempfile.TemporaryDirectory(prefix="gridlight-") as folder:
         path = Path(folder) / "render.exr"
         scene.render.filepath = str(path)
-        with quiet_stdout(), nothing_to_update():
+        with quiet_stdout(), nothing_to_update(scene):
             bpy.ops.render.render(write_still=True, scene=scene.name, layer=view_layer)
         return _read_exr(path)
 
@@ -138,11 +138,12 @@ def _read_exr(path: Path) -> np.ndarray:
 
 
 @contextmanager
-def nothing_to_update() -> Iterator[None]:
-    """For renders on a copy of a scene: operators bring the view layer of their context up to date, before and after,
+def nothing_to_update(scene: bpy.types.Scene) -> Iterator[None]:
+    """For renders of ``scene``, a copy: operators bring the view layer of their context up to date, before and after,
     which for the user's would be built anew each time, as a scene came and went. Here it is one of an empty scene.
-    Renders evaluate what they show themselves."""
+    Renders evaluate what they show themselves, but what is animated at the frame of the context's scene."""
     empty = bpy.data.scenes.new("Gridlight Empty")
+    empty.frame_current, empty.frame_subframe = scene.frame_current, scene.frame_subframe
     try:
         with bpy.context.temp_override(scene=empty, view_layer=empty.view_layers[0]):
             yield
