@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import gpu
 import numpy as np
 
@@ -77,10 +79,17 @@ def read_number(texture: gpu.types.GPUTexture) -> int:
 
 
 def wait_for_gpu() -> None:
-    """Returns when the GPU has done what it was told so far: commands are carried out in order."""
-    mark = gpu.types.GPUTexture((1, 1), format="R32F")
-    fill_elements(mark, 0, 1, 0.0)  # what nothing was written to is read without waiting
+    """Returns when the GPU has done what it was told so far: commands are carried out in order. Whatever is bound stays
+    bound."""
+    mark = _mark()
+    mark.clear(format="FLOAT", value=(0.0,))  # what nothing was written to is read without waiting
     mark.read()
+
+
+@cache
+def _mark() -> gpu.types.GPUTexture:
+    """Kept, as clearing a new one takes ten times as long."""
+    return gpu.types.GPUTexture((1, 1), format="R32F")
 
 
 def _rows(elements: int, what: str) -> int:
