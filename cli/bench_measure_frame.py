@@ -27,7 +27,7 @@ from ..gpu_shaders.context import ensure_context
 from ..gpu_shaders.dispatch_profile import limits, profiled
 from ..gpu_shaders.live_field import LiveField
 from ..gpu_shaders.scene_textures import SceneTextures
-from ..gpu_shaders.textures import wait_for_gpu
+from ..gpu_shaders.textures import GpuWait
 from ..gpu_shaders.viewport_field import FieldTextures
 from ..gpu_shaders.viewport_pass import Picture, ViewportPass
 from ..gpu_shaders.viewport_shading import Shading
@@ -50,6 +50,7 @@ _MODES = {
 }
 _SWING_M = 0.4  # radius of the circle that the light moves on
 _FUNCTIONS = 14  # of Python that are named
+_wait_for_gpu = GpuWait()
 
 
 def frame(request: dict, reporter, should_stop) -> None:
@@ -123,7 +124,7 @@ class _Following:
         if self._lead is None:
             self._lead = LiveField(self._live.backend_of(self.field.grid.name), view.show(self.field))
         self._lead.follow(1.0)
-        wait_for_gpu()
+        _wait_for_gpu()
         return time.perf_counter() - start
 
     def _work(self, snapshot: SceneSnapshot, budget_s: float) -> list[float]:
@@ -132,7 +133,7 @@ class _Following:
         while self._live.is_working:
             start = time.perf_counter()
             progress = self._live.step(budget_s)
-            wait_for_gpu()
+            _wait_for_gpu()
             slices.append(time.perf_counter() - start)
             if self._live.message:
                 raise InputError(self._live.message)
@@ -203,7 +204,7 @@ class _Views:
         self._picture.samples = 0
         start = time.perf_counter()
         self._pass.draw(self._picture, self._view, Shading(mode=mode), None)
-        wait_for_gpu()
+        _wait_for_gpu()
         return time.perf_counter() - start
 
 
@@ -224,7 +225,7 @@ def _where_it_goes(snapshot: SceneSnapshot, grid, settings: BakeSettings, should
             *([session.finish()] if whole else []),
         ):
             drive(steps, should_stop)
-        wait_for_gpu()
+        _wait_for_gpu()
         return time.perf_counter() - start
 
     first = [relight() for _ in range(2)]

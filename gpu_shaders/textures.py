@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import gpu
 import numpy as np
 
@@ -78,18 +76,23 @@ def read_number(texture: gpu.types.GPUTexture) -> int:
     return int(buffer[0])
 
 
+class GpuWait:
+    """Called, returns when the GPU has done what it was told so far: commands are carried out in order. Whatever is
+    bound stays bound. For many waits, of which the first takes ten times as long."""
+
+    def __init__(self) -> None:
+        self._mark: gpu.types.GPUTexture | None = None  # kept, as clearing a new one is what takes long
+
+    def __call__(self) -> None:
+        if self._mark is None:
+            self._mark = gpu.types.GPUTexture((1, 1), format="R32F")
+        self._mark.clear(format="FLOAT", value=(0.0,))  # what nothing was written to is read without waiting
+        self._mark.read()
+
+
 def wait_for_gpu() -> None:
-    """Returns when the GPU has done what it was told so far: commands are carried out in order. Whatever is bound stays
-    bound."""
-    mark = _mark()
-    mark.clear(format="FLOAT", value=(0.0,))  # what nothing was written to is read without waiting
-    mark.read()
-
-
-@cache
-def _mark() -> gpu.types.GPUTexture:
-    """Kept, as clearing a new one takes ten times as long."""
-    return gpu.types.GPUTexture((1, 1), format="R32F")
+    """Returns when the GPU has done what it was told so far."""
+    GpuWait()()
 
 
 def _rows(elements: int, what: str) -> int:

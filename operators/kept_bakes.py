@@ -18,7 +18,7 @@ from ..core.grid import Grid
 from ..core.probe_edits import ProbeEdits
 from ..core.settings import BakeSettings
 from ..core.steps import STEP_SECONDS, Pace, Steps
-from ..gpu_shaders.textures import wait_for_gpu
+from ..gpu_shaders.textures import GpuWait
 from ..scene.probe_objects import read_edits
 from .volume_choice import grid_of
 
@@ -47,7 +47,7 @@ class KeptBake:
 
     def __init__(self, job: BakeJob, reporter: Reporter, goal: ErrorGoal | None = None):
         self.relay = Relay(reporter)
-        pace = Pace(STEP_SECONDS, wait_for_gpu)
+        pace = Pace(STEP_SECONDS, GpuWait())
         self.session = open_session(job, self.relay, pace=pace)
         self._driven = ErrorDrivenBake(job, goal, self.relay, pace=pace) if goal else None
         self._grid, self._settings, self._edits = job.grid, job.settings, job.probe_edits  # not the whole old scene

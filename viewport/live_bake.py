@@ -26,7 +26,7 @@ from ..core.settings import BakeSettings
 from ..core.snapshot import SceneSnapshot
 from ..core.steps import Pace
 from ..core.update_order import change_weights, update_order
-from ..gpu_shaders.textures import wait_for_gpu
+from ..gpu_shaders.textures import GpuWait
 
 _STEP_SECONDS = 0.004  # a quarter of a frame
 
@@ -87,7 +87,7 @@ class LiveBake:
         self._kept: dict[str, _Kept] = {}
         self._is_rough = False  # probes have light that no field tells of yet
         self._is_settling = False
-        self._pace = pace or Pace(_STEP_SECONDS, wait_for_gpu)
+        self._pace = pace or Pace(_STEP_SECONDS, GpuWait())
 
     @property
     def is_working(self) -> bool:
