@@ -16,7 +16,7 @@ import gpu
 import numpy as np
 
 from . import programs
-from .textures import wait_for_gpu
+from .textures import GpuWait
 
 _ENOUGH_SECONDS = 0.5
 _BYTES = {"RGBA32F": 16, "RG32F": 8, "R32F": 4, "RGBA16F": 8, "R32UI": 4, "R32I": 4}
@@ -56,7 +56,7 @@ def profiled(layers: dict[str, int]) -> Iterator[dict[str, DispatchCost]]:
     """Costs by shader of all compute dispatches inside the block. ``layers``: how many the images of these names have;
     Blender does not tell."""
     costs: dict[str, DispatchCost] = {}
-    dispatch = gpu.compute.dispatch
+    dispatch, wait_for_gpu = gpu.compute.dispatch, GpuWait()
 
     def observe(name: str, shader):
         return _Observed(name, shader) if name.endswith("_comp") else shader
@@ -130,6 +130,7 @@ def limits() -> DeviceLimits:
 
 def _seconds(work, most: int = 7) -> float:
     """Median seconds of ``work`` on the GPU; slow devices repeat less."""
+    wait_for_gpu = GpuWait()
     work()
     wait_for_gpu()
     times: list[float] = []
