@@ -134,3 +134,36 @@ def test_the_import_rule_can_fail(tmp_path, monkeypatch):
         "gridlight.core.grid",
         "bpy.types",
     ]
+
+
+def _calls(function: ast.FunctionDef) -> list[str]:
+    """Names of what ``function`` calls, in the order of the text; without functions inside it."""
+    found, pending = [], list(function.body)
+    while pending:
+        node = pending.pop()
+        if isinstance(node, (ast.FunctionDef, ast.Lambda)):
+            continue
+        if isinstance(node, ast.Call):
+            named = node.func
+            name = named.attr if isinstance(named, ast.Attribute) else getattr(named, "id", "")
+            found.append(((node.end_lineno, node.end_col_offset), name.lstrip("_")))
+        pending.extend(ast.iter_child_nodes(node))
+    return [name for _place, name in sorted(found)]
+
+
+def test_nothing_is_dispatched_between_a_shaders_bindings_and_its_dispatch():
+    """What is bound belongs to no shader: the other dispatch would take its place."""
+    fills = {"allocate", "allocate_integers", "fill_elements", "copy_elements", "reserve"}
+    checked = 0
+    for path in sorted((ROOT / "gpu_shaders").glob("*.py")):
+        for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(function, ast.FunctionDef):
+                continue
+            is_bound = False
+            for name in _calls(function):
+                assert not (is_bound and name in fills), f"{path.name}: {function.name} calls {name} amid bindings"
+                if name == "program":
+                    is_bound, checked = True, checked + 1
+                elif name.startswith("dispatch"):
+                    is_bound = False
+    assert checked > 30
